@@ -353,6 +353,13 @@ def test_steps_that_no_robot_makes_are_told(folder: Path, column: str, step: flo
         assert bool(re.search(told, " ".join(notes))) is (odd == step)
 
 
+def test_a_table_of_frames_without_times_is_told(folder: Path) -> None:
+    for header, told in (("file,time_s", False), ("file;time_s", True), ("File,time_s", True)):
+        (folder / "images" / "frames.csv").write_text(f"{header}\n" + "".join(f"{k}.png,{k}\n" for k in range(FRAMES)))
+        words = " ".join(open_frames(folder / "images").notes)
+        assert ("frames.csv: without the columns file and time_s" in words) is told
+
+
 def test_no_output_takes_the_place_of_another_or_of_what_is_read(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

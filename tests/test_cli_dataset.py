@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import re
+import sys
 from pathlib import Path
 
 import cv2
@@ -11,7 +14,9 @@ import pytest
 
 import tiltvp
 from commands import Run
+from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.folder import read_dataset
+from tiltvp.lab.datasets.panoramas import read_panorama_index
 
 
 @pytest.fixture
@@ -169,3 +174,37 @@ def test_findings_are_a_table(run: Run, tmp_path: Path) -> None:
     for words in ("unknown key 'mirrored' (did you mean mirror?)", "no such file", "no file 'a.png'", "expected"):
         assert words in said
     assert run("check", tmp_path / "nothing")[0] == 1
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+@pytest.mark.parametrize("name", ["dataset.toml", "images.csv", "camera.toml", "a.png"])
+def test_pipes_in_a_dataset_are_not_read(run: Run, camera: tiltvp.Camera, name: str, tmp_path: Path) -> None:
+    camera.save(tmp_path / "camera.toml")
+    (tmp_path / "dataset.toml").write_text('camera = "camera.toml"\n')
+    (tmp_path / "images.csv").write_text("file,location,environment,alpha_deg,beta_deg\na.png,a,x,0,0\n")
+    (tmp_path / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / name)
+    code, said, _ = run("check", tmp_path)
+    assert (code, "is no regular file" in said or "no file 'a.png'" in said) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("name,environment,tilt_x_deg,tilt_z_deg\nhall,é,0,0\n".encode("latin1"), "not UTF-8"),
+        (b"name,environment,tilt_x_deg,tilt_z_deg\nhall,house,0,0,5\n", "line 2: 5 cells, expected 4"),
+        (b"name,tilt_x_deg,tilt_z_deg\nhall,0,0\n", "line 2: KeyError('environment'), expected the columns name"),
+        (None, "cannot be read (No such file or directory), expected an index of panoramas"),
+    ],
+)
+def test_an_index_that_cannot_be_read_is_named(content: bytes | None, told: str, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "INDEX.csv").write_bytes(content)
+    with pytest.raises(InvalidInputError, match=re.escape(told)):
+        read_panorama_index(tmp_path)
+
+
+def test_an_index_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    (tmp_path / "INDEX.csv").write_bytes(b"\xef\xbb\xbfname,environment,tilt_x_deg,tilt_z_deg\r\nhall,house,0,0\r\n")
+    assert [one.path.name for one in read_panorama_index(tmp_path)] == ["hall.jpg"]

@@ -56,6 +56,9 @@ class ImageFiles(Frames):
         if table is not None:
             self.tables.append(table[0])
             self.times_s = _table_times(*table, self.files)
+            if self.times_s is None:
+                told = f"{table[0]}: without the columns {table[1]} and time_s"
+                self.notes = (f"{told}: images are taken in the order of their names, and without times",)
             if self.times_s is not None and (np.diff(self.times_s) < 0.0).any():
                 order = np.argsort(self.times_s, kind="stable")
                 self.files, self.times_s = [self.files[place] for place in order], self.times_s[order]

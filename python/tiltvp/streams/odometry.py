@@ -112,7 +112,8 @@ class Odometry:
         if wheel_base_m is not None:
             if not 0.0 < number_from(wheel_base_m, "wheel_base_m") < np.inf:
                 raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected a length above 0")
-            yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
+            with np.errstate(over="ignore", invalid="ignore"):
+                yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
         return cls(array_from(times_s, "times_s"), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
 
     @classmethod

@@ -12,6 +12,8 @@ import numpy as np
 
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, TiltvpError
+from tiltvp.files import read_text
+from tiltvp.formats.document import LARGEST_BYTES
 from tiltvp.images import read_mask
 from tiltvp.lab.datasets.findings import Findings, near
 from tiltvp.robot import Robot, is_robot, named_mask
@@ -98,7 +100,7 @@ def read_description(directory: Path, findings: Findings) -> Description:
 
 def _table(file: Path, findings: Findings) -> dict[str, Any] | None:
     try:
-        return tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(read_text(file, LARGEST_BYTES))
     except OSError as error:
         findings.add(file, None, error.strerror or str(error), f"a dataset: a folder with {DESCRIPTION}")
     except (ValueError, RecursionError) as error:

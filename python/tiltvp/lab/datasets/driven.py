@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp.csv_files import LARGEST_CSV_BYTES
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import read_text
 from tiltvp.lab.datasets.driving import POSES, TRUTH
 from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.synth import DriveTruth
@@ -79,16 +82,18 @@ def _truth(rows: NDArray[np.float64]) -> DriveTruth:
 def _columns(path: Path, header: Sequence[str], wanted: Sequence[str]) -> NDArray[np.float64]:
     """(rows, wanted): columns of numbers of a table that has just this header."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            lines = csv.reader(file)
-            found = next(lines, [])
-            if tuple(found) != tuple(header):
-                raise InvalidInputError(f"{path}, line 1: expected the columns {', '.join(header)}")
-            places = [found.index(name) for name in wanted]
-            rows = [[float(row[place]) for place in places] for row in lines if row]
+        lines = csv.reader(io.StringIO(read_text(path, LARGEST_CSV_BYTES), newline=""))
     except OSError as error:
         problem = error.strerror or error
         raise InvalidInputError(f"{path}: {problem}, expected a file of a drive (tiltvp dataset drive)") from error
+    except UnicodeDecodeError as error:
+        raise InvalidInputError(f"{path}: not UTF-8, expected a file of a drive (tiltvp dataset drive)") from error
+    try:
+        found = next(lines, [])
+        if tuple(found) != tuple(header):
+            raise InvalidInputError(f"{path}, line 1: expected the columns {', '.join(header)}")
+        places = [found.index(name) for name in wanted]
+        rows = [[float(row[place]) for place in places] for row in lines if row]
     except (ValueError, IndexError, csv.Error) as error:
         raise InvalidInputError(f"{path}, line {lines.line_num}: {error}, expected {len(header)} cells") from error
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted))

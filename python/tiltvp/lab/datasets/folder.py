@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from, read_image
+from tiltvp.files import read_bytes
+from tiltvp.images import LARGEST_IMAGE_BYTES, gray_from, read_image
 from tiltvp.lab.datasets.description import Wheels, read_description
 from tiltvp.lab.datasets.findings import Findings
 from tiltvp.lab.datasets.rows import ROWS, TiltImage, read_rows
@@ -61,7 +62,7 @@ class TiltDataset:
         for file in (*self.files, *(image.path for image in self.images)):
             name = os.path.relpath(file, self.directory).replace(os.sep, "/")
             try:
-                content = hashlib.sha256(file.read_bytes())
+                content = hashlib.sha256(read_bytes(file, LARGEST_IMAGE_BYTES))
             except OSError as error:
                 raise InvalidInputError(f"{file}: {error.strerror or error}, expected a file of the dataset") from error
             total.update(f"{name}\0{content.hexdigest()}\n".encode())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import functools
 import math
 import os
@@ -16,6 +15,7 @@ import numpy as np
 
 from tiltvp._core import PixelRays, leaning_from_upright
 from tiltvp.cameras import Camera
+from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from, read_image
 
@@ -81,14 +81,11 @@ def read_index(
     Angles (`..._deg`) that are not finite cannot, nor names that were there before.
     """
     index = Path(directory) / "INDEX.csv"
-    try:
-        with index.open(newline="", encoding="utf-8") as lines:
-            rows = list(csv.DictReader(lines))
-    except OSError as error:
-        raise InvalidInputError(f"{index}: {error.strerror or error}, expected an index of panoramas") from error
+    table = CsvFile(index, "an index of panoramas")
     items: list[Item] = []
     names: set[str] = set()
-    for number, row in enumerate(rows, start=2):
+    for line, cells in table.rows():
+        row = dict(zip(table.header, cells, strict=True))
         try:
             if not all(math.isfinite(float(row[key])) for key in columns if key.endswith("_deg")):
                 raise ValueError("an angle that is not finite")
@@ -96,9 +93,9 @@ def read_index(
                 raise ValueError(f"{row['name']} once more")
             names.add(row["name"])
             items.append(make(row, index.parent))
-        except (KeyError, ValueError, TypeError) as error:
+        except (KeyError, ValueError) as error:
             expected = f"the columns {', '.join(columns)}"
-            raise InvalidInputError(f"{index}, line {number}: {error!r}, expected {expected}") from error
+            raise InvalidInputError(f"{table.where(line)}: {error!r}, expected {expected}") from error
     if not items:
         raise InvalidInputError(f"{index}: no rows, expected a panorama in each")
     return items

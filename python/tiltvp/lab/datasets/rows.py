@@ -11,7 +11,9 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from tiltvp._core import tilt_from_wheel_heights
+from tiltvp.csv_files import LARGEST_CSV_BYTES
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import read_text
 from tiltvp.lab.datasets.description import Wheels
 from tiltvp.lab.datasets.findings import Findings, near
 
@@ -46,7 +48,7 @@ def read_rows(directory: Path, wheels: Wheels | None, findings: Findings) -> tup
     """The images of a dataset, in the order of the file; rows that cannot be read go to `findings` instead."""
     file = directory / ROWS
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_text(file, LARGEST_CSV_BYTES)
         reader = csv.reader(text.splitlines(), strict=True)
         lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except OSError as error:
