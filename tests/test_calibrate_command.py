@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -221,6 +223,19 @@ def test_what_was_found_is_kept_where_the_transform_cannot_be_written(
     assert calibrate(tables, "--out", tmp_path / "found.json", "--transform", tmp_path / "camera.urdf") != 0
     assert "disk full" in capsys.readouterr().err
     assert json.loads((tmp_path / "found.json").read_text())["extrinsics"]["known"] is True
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full")
+def test_what_was_found_is_kept_where_nobody_reads_what_is_printed(tables: Path, tmp_path: Path) -> None:
+    outputs = {"--out": "found.json", "--transform": "camera.urdf", "--robot-out": "robot.toml"}
+    words = ["calibrate", "wheels.csv", "bearings.csv", "--camera", "robot.toml", *SURE]
+    for option, name in outputs.items():
+        words += [option, str(tmp_path / name)]
+    script = "import sys\nfrom tiltvp.cli import main\nsys.exit(main())"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", script, *words], cwd=tables, stdout=full, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (1, b"tiltvp: the output: No space left on device\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(outputs.values())
 
 
 @pytest.mark.parametrize(

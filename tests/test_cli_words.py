@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -202,3 +203,19 @@ def test_words_of_variables_that_are_not_set_are_refused(run: Run, words: list[s
     """They were the working folder, and options as if they were not given."""
     said = run("tilt", *words)
     assert (said.code, said.complaint.startswith(f"tiltvp: {named}: an empty word, expected one")) == (2, True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="streams of POSIX")
+@pytest.mark.parametrize("closed", ["1", "2", "0, 1, 2"])
+def test_closed_streams_of_a_service_are_no_fault(world: Path, closed: str) -> None:
+    out = world / "small.toml"
+    words = ["camera", "scale", str(world / "camera.toml"), str(out), "--factor", "0.5"]
+    script = "import sys\nfrom tiltvp.cli import main\nsys.exit(main())"
+    # What starts another program with its streams closed, as `>&-` does.
+    close = f"for k in ({closed},): os.close(k)"
+    start = f"import os, sys\n{close}\nos.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    done = subprocess.run([sys.executable, "-c", start, "-c", script, *words], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert tiltvp.Camera.load(out).width == 128
+    # And of what is wrong nothing can be said, but by the code.
+    assert subprocess.run([sys.executable, "-c", start, "-c", script, *words], capture_output=True).returncode == 2

@@ -16,7 +16,7 @@ from tiltvp.cli.lab import dataset, evaluate, measure, report, train
 from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
-from tiltvp.cli.terminal import complain, print_any_name
+from tiltvp.cli.terminal import complain, open_closed_streams, print_any_name
 from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
 from tiltvp.streams.outputs.viewer import VIEWER
@@ -51,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0 done, 1 some failed, an extra is missing or an output cannot be written, 2 wrong use.
     """
+    open_closed_streams()
     print_any_name()
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words

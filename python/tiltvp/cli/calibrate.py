@@ -14,7 +14,7 @@ from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.rerun_views import send_calibration
 from tiltvp.cli.showing import RERUN, RerunOptions
 from tiltvp.cli.sources import MotionOptions, check_apart
-from tiltvp.cli.terminal import say, status
+from tiltvp.cli.terminal import files_first, say, status
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -93,11 +93,12 @@ def calibrate(
             opened.append(log)
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]
-    known = results.tell(found, tilt, options.robot_from_camera, drive)
-    if known is not None and results.robot_out is not None:
-        looked = next((one for one in opened if isinstance(one, PictureLog)), None)
-        told = _with_wheels(robot, drive) if looked is None else looked.robot(robot)
-        results.write_robot(known, told, estimated=read.estimate_odometry)
+    with files_first():
+        known = results.tell(found, tilt, options.robot_from_camera, drive)
+        if known is not None and results.robot_out is not None:
+            looked = next((one for one in opened if isinstance(one, PictureLog)), None)
+            told = _with_wheels(robot, drive) if looked is None else looked.robot(robot)
+            results.write_robot(known, told, estimated=read.estimate_odometry)
     return 0 if known and not any(one.bad for one in opened) else NOT_RELIABLE
 
 

@@ -21,7 +21,7 @@ from tiltvp.cli.options import FrameRate, Switch, image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
-from tiltvp.cli.terminal import named, progress_bar, say
+from tiltvp.cli.terminal import files_first, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
 from tiltvp.images import read_mask
 
@@ -153,10 +153,11 @@ def corner(
         estimates = list(look.each(frames, others, partners, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {counted(look.bad, 'frames')}, none of which can be used")
-    tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
-    if sensor is not None:
-        say(sensor.summary())
-    results.write(estimates)
+    with files_first():
+        tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
+        if sensor is not None:
+            say(sensor.summary())
+        results.write(estimates)
     return 1 if look.bad or frames.problems else 0
 
 

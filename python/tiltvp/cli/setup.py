@@ -10,7 +10,7 @@ from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
 from tiltvp.cli.tables import PICTURES, check_file
-from tiltvp.cli.terminal import complain, progress_bar, say
+from tiltvp.cli.terminal import complain, files_first, progress_bar, say
 from tiltvp.files import check_output
 from tiltvp.images import read_mask
 
@@ -86,14 +86,15 @@ def setup(
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
             advance=bar.advance,
         )
-    for line in _lines(found):
-        say(line)
-    if picture is not None:
-        _draw(frames, lens, found, picture)
     if known is not None and robot_from_camera is not None:
         known = replace(known, covariance=None, covariance_rad2=None)
     robot = found.robot if known is None else found.again(known)
-    robot.save(out)
+    with files_first():
+        for line in _lines(found):
+            say(line)
+        robot.save(out)
+        if picture is not None:
+            _draw(frames, lens, found, picture)
     for reason in found.reasons:
         complain(f"{out}: not to be relied upon: {reason}")
     return 0 if found else 1

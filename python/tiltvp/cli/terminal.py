@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -16,6 +18,22 @@ if TYPE_CHECKING:
 
 _WIDTH_IN_FILES = 240
 """Columns that a table may take where there is no terminal to fit it into."""
+_WAITING: Final[ContextVar[list[Callable[[], None]] | None]] = ContextVar("waiting", default=None)
+"""What `files_first` keeps for its end."""
+
+
+def open_closed_streams() -> None:
+    """What is printed where stdout or stderr were closed, as of a service's, goes nowhere, and not into a file that
+    is opened in their place."""
+    for name, number in (("stdin", 0), ("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is not None:
+            continue
+        with suppress(OSError):
+            os.fstat(number)
+            continue
+        # The least number that is free, for those below are open by now.
+        os.open(os.devnull, os.O_RDWR)
+        setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
 
 
 def print_any_name() -> None:
@@ -24,8 +42,34 @@ def print_any_name() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
+@contextmanager
+def files_first() -> Iterator[None]:
+    """What is said and shown within comes at its end, when files are written: a full output, or one that is closed as
+    by `head`, ends the command."""
+    token = _WAITING.set([])
+    try:
+        yield
+    finally:
+        waiting = _WAITING.get() or []
+        _WAITING.reset(token)
+        for one in waiting:
+            one()
+
+
+def _now_or_later(out: Callable[[], None]) -> None:
+    waiting = _WAITING.get()
+    if waiting is None:
+        out()
+    else:
+        waiting.append(out)
+
+
 def show(*tables: Table) -> None:
     """Tables on stdout: fitted to a terminal, and as wide as they are, without padding, in files and pipes."""
+    _now_or_later(lambda: _show(*tables))
+
+
+def _show(*tables: Table) -> None:
     from rich.console import Console
 
     console = Console(highlight=False, markup=False, emoji=False, width=width())
@@ -49,7 +93,7 @@ def width() -> int:
 
 def say(text: str) -> None:
     """Lines on stdout at once, as they are."""
-    print(text, flush=True)
+    _now_or_later(lambda: print(text, flush=True))
 
 
 def complain(problem: str) -> None:
