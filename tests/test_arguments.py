@@ -317,6 +317,7 @@ FEATURE = corner.fit(
             lambda: Room("office", 1).straight_edges(None, pose=np.zeros(3)),
             "camera: NoneType, expected a tiltvp.Camera",
         ),
+        (lambda: Room("office", 1).free_poses(2**31, 1), "count: got 2147483648, expected at most 1000000 places"),
         (lambda: lines.match_wide(LINES, FEW, 3, FEW), "lines_b: int, expected Lines"),
         (lambda: lines.LineTracker().update(None, FEW), "lines: NoneType, expected Lines"),
         (lambda: SEGMENTS.pixels(1.5), "index = 1.5, expected a whole number"),

@@ -15,7 +15,7 @@ import pytest
 import tiltvp
 from commands import Run
 from tiltvp.errors import InvalidInputError
-from tiltvp.lab.datasets.folder import read_dataset
+from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.lab.datasets.panoramas import read_panorama_index
 
 
@@ -187,6 +187,21 @@ def test_pipes_in_a_dataset_are_not_read(run: Run, camera: tiltvp.Camera, name: 
     os.mkfifo(tmp_path / name)
     code, said, _ = run("check", tmp_path)
     assert (code, "is no regular file" in said or "no file 'a.png'" in said) == (1, True)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes and links of POSIX")
+def test_pipes_of_tilts_and_links_in_a_circle_are_refused(
+    run: Run, dataset: TiltDataset, world: Path, tmp_path: Path
+) -> None:
+    os.mkfifo(tmp_path / "tilts.csv")
+    words = ("render", "--panoramas", world / "panos", "--tilts-deg", tmp_path / "tilts.csv", "--out", tmp_path / "out")
+    said = run(*words)
+    assert (said.code, "is no regular file, expected ALPHA,BETA in degrees" in said.complaint) == (2, True)
+    (tmp_path / "loop").symlink_to("loop")
+    said = run("degrade", dataset.directory, "--out", tmp_path / "loop")
+    assert (said.code, "loop: exists, expected a new folder" in said.complaint) == (2, True)
+    assert os.path.islink(tmp_path / "loop")
 
 
 @pytest.mark.parametrize(

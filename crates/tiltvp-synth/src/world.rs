@@ -23,6 +23,9 @@ use crate::{furniture, laboratory, shell};
 /// would fray the edges of windows and lamps.
 const GLARE: f64 = 3.0;
 
+/// Most poses that are drawn at a time: 24 MB, and a hundred times those of the largest dataset.
+const MOST_POSES: usize = 1_000_000;
+
 /// Radius of the free circle that a robot needs to stand, metres: a cleaning robot of 0.35 m across with room to turn
 /// (`ways_are_free_smooth_and_lead_far` holds the ways to it).
 pub(crate) const ROBOT_RADIUS_M: f64 = 0.22;
@@ -176,8 +179,11 @@ impl World {
     /// Draws poses at which the robot stands free, with any heading.
     ///
     /// # Errors
-    /// If the room is too full to find them.
+    /// If the room is too full to find them, and for more than anybody looks from.
     pub fn free_poses(&self, count: usize, seed: u64) -> Result<Vec<RobotPose>> {
+        if count > MOST_POSES {
+            return Err(Error::argument("count", count, format!("at most {MOST_POSES} places")));
+        }
         let mut rng = Rng::new(seed, 1 << 32);
         let (low, high) = self.plan.bounds();
         let mut poses = Vec::with_capacity(count);

@@ -49,7 +49,7 @@ class ImageFiles(Frames):
         if drive is not None and (drive / _ODOMETRY).is_file():
             self.recording = drive / _ODOMETRY
         table = None if drive is None else _table_of(drive)
-        folders = {file.parent.resolve() for file in self.files}
+        folders = {Path(os.path.realpath(file.parent)) for file in self.files}
         folders |= {folder.parent for folder in folders if folder.name in _INNER}
         self.tables = [folder / name for folder in folders for name in (_TIMES, _ODOMETRY)]
         """Where tables are that are read with the images of a folder, or would be if they were there."""
@@ -157,7 +157,8 @@ def _table_of(folder: Path) -> tuple[Path, str] | None:
     stereo pair's has left and right."""
     if (folder / _TIMES).is_file():
         return folder / _TIMES, "file"
-    name, above = folder.resolve().name, folder.resolve().parent / _TIMES
+    whole = Path(os.path.realpath(folder))
+    name, above = whole.name, whole.parent / _TIMES
     return (above, name) if above.is_file() and name in CsvFile(above, _TABLE).header else None
 
 

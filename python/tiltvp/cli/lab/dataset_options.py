@@ -13,8 +13,9 @@ from cyclopts import Parameter
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads
+from tiltvp.csv_files import LARGEST_CSV_BYTES
 from tiltvp.errors import InvalidInputError
-from tiltvp.files import keeps_existing
+from tiltvp.files import keeps_existing, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -193,7 +194,7 @@ def made_by(command: str) -> dict[str, str]:
 def _tilts_of_file(file: Path) -> list[tuple[float, float]]:
     columns = ["alpha_deg", "beta_deg"]
     try:
-        lines = list(csv.reader(file.read_text(encoding="utf-8-sig").splitlines()))
+        lines = list(csv.reader(read_text(file, LARGEST_CSV_BYTES).splitlines()))
     except OSError as error:
         problem = error.strerror or error
         raise InvalidInputError(f"{file}: {problem}, expected ALPHA,BETA in degrees, or a CSV file") from error

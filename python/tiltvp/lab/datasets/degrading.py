@@ -79,7 +79,7 @@ def degrade_dataset(
     """
     if dataset.mask is not None:
         raise InvalidInputError(f"{dataset.directory}: has a mask, expected a dataset without one")
-    if path_from(out).resolve() == dataset.directory.resolve():
+    if os.path.realpath(path_from(out)) == os.path.realpath(dataset.directory):
         raise InvalidInputError(f"{os.fspath(out)}: is the dataset that is read, expected another folder")
     stop = Event()
     about = {"kind": "degraded", "hardships": list(HARDSHIPS), "seed": seed, "of": dict(dataset.source)}
