@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,16 @@ def test_accelerations_in_other_units_are_told() -> None:
     assert known["gravity"] is None
     sensor.took(0.5, known)
     assert "down of 0 of 1 frames; its accelerations have 1 m/s^2 in the median, expected 9.81" in sensor.summary()
+
+
+def test_rates_in_degrees_are_told() -> None:
+    times = np.arange(0.0, 1.0, 0.01)
+    rates = np.column_stack([np.sin(times), 0.0 * times, 2.0 * np.cos(times)])
+    assert InertialSamples(times, rates, None).notes == ()
+    told = InertialSamples(times, np.degrees(rates), None)
+    assert "turns of up to 115 rad/s, which no such sensor tells: are they in degrees?" in told.notes[0]
+    assert replace(told, frame="imu").notes == told.notes
+    assert told.notes[0] in Inertial(told, np.eye(3)).summary()
 
 
 def test_tables_of_readings(tmp_path: Path) -> None:

@@ -30,6 +30,8 @@ _BIAS_RAD_S: Final = float(np.radians(0.2))
 _SCALE: Final = 0.01
 """Standard deviation of scale and axes of rates together, as a share of the turn: 0.5 % each, and mountings by hand."""
 _GRAVITY_M_S2: Final = 9.81
+_FASTEST_RAD_S: Final = 70.0
+"""What the widest ranges of such sensors reach, 4000 degrees a second."""
 _LEVEL_RAD: Final = float(np.radians(0.5))
 """Standard deviation of down by a sensor at rest: a bias of 5 mg is 0.3 degrees, and as much of the mounting."""
 _STEADY_RAD: Final = float(np.radians(5.0))
@@ -77,6 +79,10 @@ class InertialSamples:
                 finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
             raise InvalidInputError(f"{self.source}: {counted(n, 'samples')}, expected two or more of rising times")
+        fastest = float(np.abs(self.rates_rad_s).max())
+        told = f"{self.source}: turns of up to {fastest:.3g} rad/s, which no such sensor tells: are they in degrees?"
+        if fastest > _FASTEST_RAD_S and told not in self.notes:
+            object.__setattr__(self, "notes", (*self.notes, told))
 
     @property
     def gaps(self) -> str | None:
