@@ -284,6 +284,7 @@ def test_stdin(run: Run, world: Path, room: RoomImage, monkeypatch: pytest.Monke
         (["images", "--filter", "--odometry-topic", "/odom"], "no recording, expected --odometry"),
         (["drive.mp4", "--filter", "--odometry", "odo.csv", "--odometry-topic", "/a"], "odo.csv: expected a recording"),
         (["images", "--wheel-base", "0.4"], "--wheel-base without --filter"),
+        (["images", "--jump-after", "0"], "--jump-after without --filter"),
         (["images", "--wheel-radius", "0.4"], "--wheel-radius without --filter"),
         (["images", "--filter", "--wheel-base", "0.4"], "--wheel-base without --odometry"),
         (["images", "--filter", "--odometry-gap", "2"], "--odometry-gap without --odometry"),

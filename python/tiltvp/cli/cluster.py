@@ -50,7 +50,7 @@ class Task:
 def check_cluster(out: Path | None, **others: object) -> None:
     """Refuses what cannot be with --cluster, before any work is done; `others` are options and what was given."""
     for name, given in others.items():
-        if given not in (None, False):
+        if given is not None and given is not False:
             raise InvalidInputError(f"--{name.replace('_', '-')} with --cluster, expected one of them")
     if out is None or out.suffix or (out.exists() and not out.is_dir()):
         raise InvalidInputError(f"--cluster with --out {out or 'not given'}, expected a folder for Parquet files")

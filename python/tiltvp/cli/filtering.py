@@ -48,7 +48,7 @@ class FilterOptions(LibraryOptions):
     def check(self) -> None:
         """Refuses what cannot be, before any work is done."""
         for name in ("filter_plot", *self._keywords):
-            given = getattr(self, name) not in (None, False)
+            given = (value := getattr(self, name)) is not None and value is not False
             if given and name != "confidence_min" and not self.filter:
                 raise InvalidInputError(f"--{name.replace('_', '-')} without --filter, expected both")
         check_plot("--filter-plot", self.filter_plot)
