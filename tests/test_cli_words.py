@@ -205,6 +205,23 @@ def test_words_of_variables_that_are_not_set_are_refused(run: Run, words: list[s
     assert (said.code, said.complaint.startswith(f"tiltvp: {named}: an empty word, expected one")) == (2, True)
 
 
+def test_no_output_takes_the_place_of_the_calibration(run: Run, world: Path) -> None:
+    calibration, mask = world / "camera.json", world / "mask.png"
+    # Its content tells its format, and an answer may have such a name.
+    calibration.write_bytes((world / "camera.toml").read_bytes())
+    tiltvp.write_image(mask, np.full((256, 256), 255, np.uint8))
+    read = calibration.read_bytes(), mask.read_bytes()
+    for verb, option, out in (
+        ("tilt", "--out", calibration), ("lines", "--out", calibration), ("segments", "--out", calibration),
+        ("track", "--out", calibration), ("track", "--plot", mask), ("mount", "--out", calibration),
+    ):  # fmt: skip
+        more = ("--out", world / "t.csv") if option == "--plot" else ()
+        masked = () if verb == "segments" else ("--mask", mask)
+        words = (world / "images", "--camera", calibration, *masked, option, out, *more, "--overwrite")
+        assert "is what is read, or holds it, expected another place" in run(verb, *words).complaint
+    assert (calibration.read_bytes(), mask.read_bytes()) == read
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="streams of POSIX")
 @pytest.mark.parametrize("closed", ["1", "2", "0, 1, 2"])
 def test_closed_streams_of_a_service_are_no_fault(world: Path, closed: str) -> None:

@@ -89,7 +89,7 @@ def calibrate(
         else:
             log = PictureLog.open(source, pictures, motion, camera, options, drive, robot, read)
             written = (results.out, results.robot_out, results.transform, results.plot, pictures.tracks)
-            check_apart(log.frames, *written, beside=motion.odometry)
+            check_apart(log.frames, *written, beside=(motion.odometry,))
             opened.append(log)
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]

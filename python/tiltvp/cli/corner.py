@@ -146,7 +146,7 @@ def corner(
     frames = source.open(words)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
     for side in (frames, others):
-        check_apart(side, *results.files.values(), beside=inertial.imu)
+        check_apart(side, *results.files.values(), beside=(inertial.imu, options.mask, calibration))
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)

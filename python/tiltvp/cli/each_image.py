@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -53,12 +53,17 @@ def find_in_each(
     look: Callable[[Image], Found],
     results: FoundOptions,
     draw: Callable[[Image, Found], Image],
+    *,
+    beside: Sequence[Path | None],
 ) -> tuple[list[tuple[str, Found]], bool]:
-    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; whether all went well."""
+    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; whether all went well.
+
+    No output takes the place of what is read `beside` the images.
+    """
     from tiltvp.images import gray_from, write_image
 
     frames, overlay = source.open(images or []), results.overlay
-    check_apart(frames, overlay, results.out)
+    check_apart(frames, overlay, results.out, beside=beside)
     found: list[tuple[str, Found]] = []
     well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:

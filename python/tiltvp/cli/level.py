@@ -105,7 +105,8 @@ def level(
     frames = source.open(images or [])
     of_files = isinstance(frames, ImageFiles)
     path = out if as_video or of_files else out / f"{Path(frames.source).stem}.mp4"
-    check_apart(frames, path, filtering.filter_plot, beside=motion.odometry)
+    calibration = None if camera is None else camera.camera
+    check_apart(frames, path, filtering.filter_plot, beside=(motion.odometry, method.mask, calibration))
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")
     fused = filtering.filter or as_video or not of_files

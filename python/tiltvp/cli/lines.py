@@ -43,6 +43,7 @@ def lines(
         lambda gray: extractor(gray, tilt(gray)),
         results,
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),
+        beside=(options.mask, camera.camera),
     )
     table = line_table(found)
     if results.out is not None:

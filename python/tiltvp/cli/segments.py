@@ -51,7 +51,14 @@ def segments(
     source = source.of_robot(camera.robot(), images or [])
     lens = camera.load(source.topic)
     detector = SegmentDetector(lens, **camera.complete(options).given())
-    found, well = find_in_each(images, source, detector, results, lambda gray, seen: draw_segments(gray, lens, seen))
+    found, well = find_in_each(
+        images,
+        source,
+        detector,
+        results,
+        lambda gray, seen: draw_segments(gray, lens, seen),
+        beside=(camera.camera,),
+    )
     if results.out is not None:
         write_table(segment_table(found), results.out)
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])

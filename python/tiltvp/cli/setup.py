@@ -71,7 +71,7 @@ def setup(
     lens = camera.load(source.topic)
     mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
     frames = source.open(recording)
-    check_apart(frames, out, picture, mask_path(out), beside=motion.odometry)
+    check_apart(frames, out, picture, mask_path(out), beside=(motion.odometry,))
     motion = motion.of_robot(known, frames)
     moved = motion.motions(frames)
     with progress_bar(measured_count(frames), "images") as bar:

@@ -182,15 +182,16 @@ def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
     return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
 
 
-def check_apart(frames: Frames | None, *outputs: Path | None, beside: Path | None = None) -> None:
-    """Refuses what is read, images, video, recording, odometry or what is `beside` them, a place within a bag's folder,
-    a folder that holds images, whose place pictures would take, and the names of tables that are read with images."""
+def check_apart(frames: Frames | None, *outputs: Path | None, beside: Sequence[Path | None]) -> None:
+    """Refuses what is read, images, video, recording, or what is `beside` them, as odometry and calibration, a place
+    within a bag's folder, a folder that holds images, whose place pictures would take, and the names of tables that are
+    read with images."""
     from tiltvp.streams import is_recording
     from tiltvp.streams.image_files import ImageFiles
 
     if frames is None or frames.count is None:
         return
-    places = {os.path.realpath(path) for path in (frames.source, frames.recording, beside) if path is not None}
+    places = {os.path.realpath(path) for path in (frames.source, frames.recording, *beside) if path is not None}
     bags = {place for place in places if os.path.isdir(place) and is_recording(place)}
     if isinstance(frames, ImageFiles):
         folders = {file.parent: os.path.realpath(file.parent) for file in frames.files}

@@ -104,7 +104,9 @@ def tilt(
     source = source.of_robot(robot, images or [])
     estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load(source.topic))
     frames = source.open(images or [])
-    check_apart(frames, overlay, level, out, filtering.filter_plot, beside=motion.odometry)
+    check_apart(
+        frames, overlay, level, out, filtering.filter_plot, beside=(motion.odometry, method.mask, camera.camera)
+    )
     check_stamps(out, frames, frame_rate)
     moved = motion.motions_of(robot, frames) if filtering.filter else None
     filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))

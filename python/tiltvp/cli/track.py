@@ -96,7 +96,7 @@ def track(
     place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
     tracker = LineTracker(**place | tracking.given())
     frames = frames_of.open(words)
-    check_apart(frames, video, out, plot, beside=motion.odometry)
+    check_apart(frames, video, out, plot, beside=(motion.odometry, options.mask, camera.camera))
     motions = needed_turns(motion.motions_of(robot, frames))
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
