@@ -11,7 +11,6 @@ import numpy as np
 from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
-from tiltvp.cli.calibrate_inputs import Solved
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
