@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,20 @@ def sequence() -> StereoSequence:
 def samples_of(sequence: StereoSequence, seed: int) -> InertialSamples:
     imu = sequence.imu(seed=seed)
     return InertialSamples(imu.times_s, imu.rates_rad_s, imu.forces_m_s2)
+
+
+def test_a_frame_of_a_long_record_takes_no_longer_than_one_of_a_short() -> None:
+    """Of half an hour at 200 Hz nothing as long as the record is made for a frame."""
+    times_s = 0.005 * np.arange(400_000)
+    samples = InertialSamples(times_s, np.zeros((len(times_s), 3)), np.tile([0.0, 0.0, 9.81], (len(times_s), 1)))
+    samples.known(999.9, 1000.0)
+    tracemalloc.start()
+    known = samples.known(1000.0, 1000.1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert known["gyro"] is not None
+    assert known["gravity"] is not None
+    assert peak < len(times_s)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,17 @@ def test_a_bomb_of_aliases_is_refused_and_common_aliases_are_read(tmp_path: Path
         f"cam1:\n{camera}  intrinsics: *k\n  resolution: *size\n"
     )
     assert tiltvp.Camera.load(path, camera=0) == tiltvp.Camera.load(path, camera=1)
+
+
+def test_a_long_table_of_odometry_takes_a_few_times_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "odometry.csv"
+    rows = [f"{0.01 * k:.2f},{0.001 * k:.4f},{0.002 * k:.4f},0.10000\n" for k in range(10_000)]
+    path.write_text("".join(["time_s,x_m,y_m,yaw_rad\n", *rows]))
+    tracemalloc.start()
+    read_odometry(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 12 * path.stat().st_size
 
 
 @pytest.mark.slow

@@ -140,21 +140,25 @@ class InertialSamples:
         gyro = None if before_s is None else self._turned(before_s, now_s, turn)
         return {"gravity": self._down(now_s, turn), "gyro": gyro}
 
+    def _about(self, first_s: float, last_s: float) -> slice:
+        """The samples between two times and those beside them: looking through all for each frame takes the square of
+        a drive's length."""
+        first, last = np.searchsorted(self.times_s, [first_s, last_s]).tolist()
+        return slice(max(first - 1, 0), last + 1)
+
     def _turned(
         self, before_s: float, now_s: float, camera_from_sensor: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         import cv2
 
-        inside = (self.times_s > before_s) & (self.times_s < now_s)
-        nodes = np.concatenate([[before_s], self.times_s[inside], [now_s]])
         covered = self.times_s[0] - _GAP_S <= before_s and now_s <= self.times_s[-1] + _GAP_S
         # Frames nearer to each other than samples are covered by those about them.
-        about = self.times_s[
-            max(np.searchsorted(self.times_s, before_s) - 1, 0) : np.searchsorted(self.times_s, now_s) + 1
-        ]
-        if not covered or now_s <= before_s or (len(about) > 1 and float(np.diff(about).max()) > _GAP_S):
+        about = self._about(before_s, now_s)
+        times_s = self.times_s[about]
+        if not covered or now_s <= before_s or (len(times_s) > 1 and float(np.diff(times_s).max()) > _GAP_S):
             return None
-        rates = np.column_stack([np.interp(nodes, self.times_s, rate) for rate in self.rates_rad_s.T])
+        nodes = np.concatenate([[before_s], times_s[(times_s > before_s) & (times_s < now_s)], [now_s]])
+        rates = np.column_stack([np.interp(nodes, times_s, rate) for rate in self.rates_rad_s[about].T])
         steps_s = np.diff(nodes)
         before_from_now = np.eye(3)
         for vector in 0.5 * (rates[1:] + rates[:-1]) @ camera_from_sensor.T * steps_s[:, None]:
@@ -169,19 +173,20 @@ class InertialSamples:
 
         if self.accelerations_m_s2 is None:
             return None
-        nearest = int(np.argmin(np.abs(self.times_s - now_s)))
+        about = self._about(now_s - _SWAY_S, now_s + _SWAY_S)
+        times_s, rates, forces = self.times_s[about], self.rates_rad_s[about], self.accelerations_m_s2[about]
+        nearest = int(np.argmin(np.abs(times_s - now_s)))
         # Turns are known since the last gap and up to the next one.
-        unbroken = np.cumsum(np.diff(self.times_s, prepend=self.times_s[:1]) > _GAP_S)
-        near = np.flatnonzero((np.abs(self.times_s - now_s) <= _SWAY_S) & (unbroken == unbroken[nearest]))
-        if len(near) < 2 or abs(self.times_s[nearest] - now_s) > _GAP_S:
+        unbroken = np.cumsum(np.diff(times_s, prepend=times_s[:1]) > _GAP_S)
+        near = np.flatnonzero((np.abs(times_s - now_s) <= _SWAY_S) & (unbroken == unbroken[nearest]))
+        if len(near) < 2 or abs(times_s[nearest] - now_s) > _GAP_S:
             return None
-        times_s, rates = self.times_s[near], self.rates_rad_s[near]
         turns = [np.eye(3)]
-        for vector in 0.5 * (rates[1:] + rates[:-1]) * np.diff(times_s)[:, None]:
+        for vector in 0.5 * (rates[near[1:]] + rates[near[:-1]]) * np.diff(times_s[near])[:, None]:
             turns.append(turns[-1] @ cv2.Rodrigues(vector)[0])
-        now = turns[nearest - near[0]] @ cv2.Rodrigues(self.rates_rad_s[nearest] * (now_s - self.times_s[nearest]))[0]
+        now = turns[nearest - near[0]] @ cv2.Rodrigues(rates[nearest] * (now_s - times_s[nearest]))[0]
         # All in the axes at the frame.
-        forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), self.accelerations_m_s2[near])
+        forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), forces[near])
         mean = forces.mean(axis=0)
         length = float(np.linalg.norm(mean))
         # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end

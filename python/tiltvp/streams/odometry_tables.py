@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,14 +56,16 @@ class OdometryTable:
         table = CsvFile(path, "odometry as CSV")
         kind = _kind_of(table.name, table.header)
         names = [_ALIASES.get(column, column) for column in table.header]
-        cells = [(line, dict(zip(names, row, strict=True))) for line, row in table.rows()]
-        columns = {
-            name: np.array([table.number(line, name, row[name]) for line, row in cells], dtype=np.float64)
-            for name in names
-            if name not in ("file", "step")
-        }
-        files = [row["file"] for _, row in cells] if "file" in names else None
-        return cls(table.name, kind, columns, [line for line, _ in cells], files)
+        places = {name: place for place, name in enumerate(names) if name not in ("file", "step")}
+        numbers, lines, files = {name: array("d") for name in places}, [], []
+        for line, cells in table.rows():
+            lines.append(line)
+            for name, place in places.items():
+                numbers[name].append(table.number(line, name, cells[place]))
+            if "file" in names:
+                files.append(cells[names.index("file")])
+        columns = {name: np.array(values, dtype=np.float64) for name, values in numbers.items()}
+        return cls(table.name, kind, columns, lines, files if "file" in names else None)
 
     def __len__(self) -> int:
         return len(self.lines)
