@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from tiltvp.setup_check import opposite_direction
 from tiltvp.streams import NamedImages, Odometry, Wheels, open_frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
-from tiltvp.turning import telling_frames, turn_axis
+from tiltvp.turning import small_camera, telling_frames, turn_axis
 
 pytestmark = pytest.mark.slow
 
@@ -223,6 +224,17 @@ def test_headings_of_a_compass_are_those_of_turns(drive):
     assert check_turns(images, of_compass, CAMERA, np.eye(3)) == check_turns(images, headings, CAMERA, np.eye(3))
     few = [np.pi - 0.1, 0.1 - np.pi] * 3
     assert check_turns(images[:6], few, CAMERA, np.eye(3)).turned_rad == pytest.approx(0.2)
+
+
+def test_images_are_kept_small_and_as_bytes():
+    image = np.random.default_rng(1).integers(0, 255, (CAMERA.height, CAMERA.width), dtype=np.uint8)
+    small, peaks = small_camera(CAMERA), []
+    for count in (20, 220):
+        tracemalloc.start()
+        check_turns((image for _ in range(count)), np.zeros(count), CAMERA, np.eye(3))
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] - peaks[0] < 2 * 200 * small.width * small.height
 
 
 def odometry(steps_s: np.ndarray) -> tuple[np.ndarray, Odometry]:
