@@ -52,6 +52,9 @@ def test_a_log_has_the_tracks_that_are_seen_longest() -> None:
 
     log = bearing_log([frame(0, 400), frame(1, 300), frame(2, 200)])
     assert set(log[:, 1].tolist()) == set(range(150))
+    # Hours have more tracks than a whole log may have landmarks.
+    log = bearing_log([frame(0, 6000), frame(1, 5000), *(frame(2 + k, 0) for k in range(7000))])
+    assert set(log[:, 1].tolist()) == set(range(4000))
 
 
 def test_the_legs_are_what_is_driven(drive: Drive) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp._core import LineTracker
+from tiltvp._core import MOST_LANDMARKS, LineTracker
 from tiltvp.arguments import each_from, number_from, refuse_uncallable, refuse_unless
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.images import gray_from
@@ -149,7 +149,7 @@ def follow_lines(
 def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: float = 2) -> NDArray[np.float64]:
     """(M, 3): number of the frame, track, bearing in radians, of tracks seen in at least `frames_min` frames.
 
-    Of more than 150 tracks, or than there are frames, those that are seen in most.
+    Of more than 150 tracks, or than there are frames, those that are seen in most; no more than a whole log may have.
     """
     frames, frames_min = each_from(frames, "frames", "tracked", "FollowedFrame"), number_from(frames_min, "frames_min")
     rows = [
@@ -159,7 +159,7 @@ def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: float = 2) -> ND
     ]
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)
     _, which, counts = np.unique(table[:, 1], return_inverse=True, return_counts=True)
-    longest = np.argsort(-counts, kind="stable")[: max(_TRACKS, len(frames))]
+    longest = np.argsort(-counts, kind="stable")[: min(max(_TRACKS, len(frames)), MOST_LANDMARKS)]
     return table[(counts[which] >= frames_min) & np.isin(which, longest)]
 
 
