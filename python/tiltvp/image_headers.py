@@ -15,7 +15,7 @@ __all__ = ["file_orientation", "header_size", "orientation", "unturned"]
 _PNM: Final = rb"P[1-7](?:\s|#[^\n]*\n)+"
 _PNM_NUMBER: Final = rb"(?:\s|#[^\n]*\n)*(\d{1,9})"
 _PAM_SIDE: Final = rb"(?m)^(WIDTH|HEIGHT)[ \t]+(\d{1,9})\s*$"
-_JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _TIFF: Final = rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]"
 _HEAD_BYTES: Final = 1 << 17
 """Of a photograph, among which its orientation tag is: it has to be in the first 64 kB of segments."""
@@ -91,7 +91,7 @@ def _jpeg(data: bytes) -> tuple[int, int] | None:
             at += 1
         marker = data[at]
         at += 1
-        if marker in _JPEG_FRAMES:
+        if marker in JPEG_FRAMES:
             height, width = struct.unpack_from(">HH", data, at + 3)
             return width, height
         if marker not in (0x00, 0x01, *range(0xD0, 0xD9)):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.errors import ImageFileError
+from tiltvp.image_headers import JPEG_FRAMES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +25,6 @@ PHOTO_TILT_MAX_RAD: Final = math.radians(60.0)
 to lie on their side."""
 
 _SOI, _SOS, _DQT, _APP0, _APP1, _APP2, _APP14, _COMMENT = 0xD8, 0xDA, 0xDB, 0xE0, 0xE1, 0xE2, 0xEE, 0xFE
-_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _PROGRESSIVE: Final = frozenset((0xC2, 0xC6, 0xCA, 0xCE))
 _XMP, _MORE_XMP = b"http://ns.adobe.com/xap/1.0/\0", b"http://ns.adobe.com/xmp/extension/\0"
 _SEVERAL_PICTURES = b"MPF\0"
@@ -238,7 +238,7 @@ def encode_like(
 
     jpeg = _parsed(original)
     options = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality(original)]
-    frame = next((segment for segment in jpeg.head if segment.marker in _FRAMES), None)
+    frame = next((segment for segment in jpeg.head if segment.marker in JPEG_FRAMES), None)
     # A frame begins with its precision, its height and its width.
     same_size = frame is not None and struct.unpack(">HH", frame.content[1:5]) == image.shape[:2]
     if frame is not None:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from tiltvp import Robot
     from tiltvp.streams import InertialSamples, Recording
 
-_AT_REST_M_S2: Final = 9.81
 _OTHER_UNIT: Final = 0.1
 """By which share accelerations are off in the median where their unit is another, or the sensor is not calibrated: a
 hand that holds a camera adds less."""
@@ -111,13 +110,15 @@ class Inertial:
 
     def summary(self) -> str:
         """In how many frames it told something, what of it is missing, and where its times are if in no frame."""
+        from tiltvp.streams.inertial import GRAVITY_M_S2
+
         told, times_s = self.told, self.samples.times_s
         text = f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"
         text = "; ".join([text, *filter(None, (self.samples.gaps, *self.samples.notes))])
         forces = self.samples.accelerations_m_s2
-        length = _AT_REST_M_S2 if forces is None else float(np.median(np.linalg.norm(forces, axis=1)))
-        if abs(length / _AT_REST_M_S2 - 1.0) > _OTHER_UNIT:
-            text += f"; its accelerations have {length:.3g} m/s^2 in the median, expected {_AT_REST_M_S2:g} at rest"
+        length = GRAVITY_M_S2 if forces is None else float(np.median(np.linalg.norm(forces, axis=1)))
+        if abs(length / GRAVITY_M_S2 - 1.0) > _OTHER_UNIT:
+            text += f"; its accelerations have {length:.3g} m/s^2 in the median, expected {GRAVITY_M_S2:g} at rest"
         if told["gyro"] or told["gravity"] or self.first_s is None:
             return text
         spans = (times_s[0], times_s[-1], self.first_s, self.before_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 __all__ = ["send_calibration", "send_corner", "send_lines"]
 
 _BLUE, _PALE = [36, 99, 168], [160, 190, 225]
-_BAND_SIGMAS: Final = 1.96
-"""Half the width of a band that holds 95 % of a normal distribution."""
 
 
 def send_lines(
@@ -53,6 +51,7 @@ def send_calibration(viewer: Viewer, log: DriveLog, history: Sequence[MountingEs
     """
     from tiltvp.overlays.drive_map import landmark_places, robot_poses
     from tiltvp.overlays.lines import track_colour
+    from tiltvp.overlays.live import BAND_SIGMAS
     from tiltvp.rotations import about_vertical
 
     e = whole.mounting
@@ -73,7 +72,7 @@ def send_calibration(viewer: Viewer, log: DriveLog, history: Sequence[MountingEs
         viewer.at(step, None if log.times_s is None else float(log.times_s[step]))
         sigmas = np.sqrt(np.diag(estimate.covariance_xy_yaw))
         values = np.array([1e3 * estimate.x_m, 1e3 * estimate.y_m, np.degrees(estimate.yaw_rad)])
-        halves = _BAND_SIGMAS * sigmas * [1e3, 1e3, np.degrees(1.0)]
+        halves = BAND_SIGMAS * sigmas * [1e3, 1e3, np.degrees(1.0)]
         for name, value, half in zip(("x_mm", "y_mm", "yaw_deg"), values, halves, strict=True):
             names = [name, f"{name}: lower end of 95 %", f"{name}: upper end of 95 %"]
             viewer.curves(f"mounting/{name}", [value, value - half, value + half], names, [_BLUE, _PALE, _PALE])

@@ -29,7 +29,7 @@ _SPAN_S: Final = 20.0
 """Seconds of the chart: a bump takes a tenth of it, and a drift of a degree a minute a third of a degree."""
 _STEPS_MOST: Final = 2_000
 """Of tilts in the chart: more than its columns of pixels, in 20 s at 100 frames a second."""
-_BAND_SIGMAS: Final = 1.96
+BAND_SIGMAS: Final = 1.96
 """Half the width of a band that holds 95 % of a normal distribution."""
 _LEVEL_MIN: Final = 1e-3
 """Cosine of the pitch at which roll has no meaning: a twentieth of a degree from nose down."""
@@ -42,7 +42,7 @@ def roll_and_pitch(tilt: Tilt | None) -> NDArray[np.float64]:
         return np.full((2, 3), np.nan)
     _, covariance = attitude(tilt)
     # Roll is about an axis that is nose down by the pitch, of which an error about the level one is a part.
-    half = _BAND_SIGMAS * np.sqrt(np.diag(covariance)[:2]) / [max(math.cos(tilt.pitch_rad), _LEVEL_MIN), 1.0]
+    half = BAND_SIGMAS * np.sqrt(np.diag(covariance)[:2]) / [max(math.cos(tilt.pitch_rad), _LEVEL_MIN), 1.0]
     middle = np.array([tilt.roll_rad, tilt.pitch_rad])
     return np.asarray(np.degrees(np.stack([middle, middle - half, middle + half], axis=1)), dtype=np.float64)
 

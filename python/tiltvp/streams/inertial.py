@@ -29,7 +29,7 @@ _BIAS_RAD_S: Final = float(np.radians(0.2))
 """Standard deviation of the bias of rates, alike."""
 _SCALE: Final = 0.01
 """Standard deviation of scale and axes of rates together, as a share of the turn: 0.5 % each, and mountings by hand."""
-_GRAVITY_M_S2: Final = 9.81
+GRAVITY_M_S2: Final = 9.81
 _FASTEST_RAD_S: Final = 70.0
 """What the widest ranges of such sensors reach, 4000 degrees a second."""
 _LEVEL_RAD: Final = float(np.radians(0.5))
@@ -191,8 +191,8 @@ class InertialSamples:
         length = float(np.linalg.norm(mean))
         # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end
         # it is the square root of two of its root mean square.
-        scatter = float(np.sqrt(((forces - mean) ** 2).sum(axis=1).mean() / 3.0)) / _GRAVITY_M_S2
-        sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + 2.0 * scatter**2 + (length / _GRAVITY_M_S2 - 1.0) ** 2))
+        scatter = float(np.sqrt(((forces - mean) ** 2).sum(axis=1).mean() / 3.0)) / GRAVITY_M_S2
+        sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + 2.0 * scatter**2 + (length / GRAVITY_M_S2 - 1.0) ** 2))
         if sigma_rad > _STEADY_RAD:
             return None
         return -(camera_from_sensor @ mean) / length, sigma_rad

@@ -31,9 +31,9 @@ _WHOLE_DRIVE = 100_000
 _TRUE_POLAR = (-0.34, 0.23, 0.33)
 _TRUE_PLANE = np.array([0.23 * math.cos(-0.34), 0.23 * math.sin(-0.34), -0.01])
 """The same mounting as x, y, yaw."""
-_START_ERRORS = (0.34, 0.03, 0.33)
+START_ERRORS = (0.34, 0.03, 0.33)
 """Standard deviations of the errors of phi, rho, psi at the start."""
-_START_SIGMA = (0.2, 0.2, 0.6)
+START_SIGMA = (0.2, 0.2, 0.6)
 """What the default filter is told about its start, as x, y, yaw."""
 _BASE_M = 0.4
 _CENSI_LANDMARKS = 10
@@ -55,7 +55,7 @@ def simulated_drives(kind: str, method: str, runs: int, *, advance: Callable[[],
     for seed in range(runs):
         drive = simulate_drive(kind, seed=seed, wheel_base_m=_BASE_M)
         *_, e = _estimates(drive, method, seed)
-        bound = drive.cramer_rao_bound(start_sigma=_START_SIGMA)
+        bound = drive.cramer_rao_bound(start_sigma=START_SIGMA)
         error = np.array([e.x_m, e.y_m, e.yaw_rad]) - _TRUE_PLANE
         polar = np.array([e.phi_rad, e.rho_m, e.psi_rad]) - _TRUE_POLAR
         error[2], polar[0], polar[2] = (_wrapped(x) for x in (error[2], polar[0], polar[2]))
@@ -75,13 +75,13 @@ def simulated_drives(kind: str, method: str, runs: int, *, advance: Callable[[],
 
 def _estimates(drive: SimulatedDrive, method: str, seed: int) -> Iterator[MountingEstimate]:
     """The mounting after each step of a drive, from a start whose errors the seed draws."""
-    phi, rho, psi = np.array(_TRUE_POLAR) + np.random.default_rng(seed).normal(size=3) * _START_ERRORS
+    phi, rho, psi = np.array(_TRUE_POLAR) + np.random.default_rng(seed).normal(size=3) * START_ERRORS
     rho = max(rho, 0.05)
     start = np.array([rho * math.cos(phi), rho * math.sin(phi), phi + psi])
-    sigma: Any = _START_SIGMA
+    sigma: Any = START_SIGMA
     if method == "paper":
         j = np.linalg.inv(_polar_by_plane(start))
-        sigma = j @ np.diag(np.square(_START_ERRORS)) @ j.T
+        sigma = j @ np.diag(np.square(START_ERRORS)) @ j.T
     calibrator = SelfCalibrator(wheel_base_m=_BASE_M, start=start, start_sigma=sigma, method=method)
     bearings = drive.bearings
     ends = np.searchsorted(bearings[:, 0], np.arange(len(drive.odometry) + 1))

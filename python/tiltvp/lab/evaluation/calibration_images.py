@@ -14,6 +14,7 @@ import polars as pl
 
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.new import in_order
+from tiltvp.lab.evaluation.calibration import START_ERRORS, START_SIGMA
 from tiltvp.line_calibration import calibrate_lines
 from tiltvp.line_logs import SeenFrame, see_lines
 from tiltvp.lines import LineExtractor
@@ -28,15 +29,12 @@ if TYPE_CHECKING:
     from tiltvp._core import Camera
 
 __all__ = [
-    "MOUNTING", "START_SIGMA", "PictureExperiment", "drive_images", "lines_of", "picture_drives", "picture_start",
+    "MOUNTING", "PictureExperiment", "drive_images", "lines_of", "picture_drives", "picture_start",
     "room_drive",
 ]  # fmt: skip
 
 _PHI_RAD, _RHO_M, _PSI_RAD = -0.34, 0.23, 0.33
 """The paper's mounting."""
-_START_ERRORS = (0.34, 0.03, 0.33)
-"""Standard deviations of the errors of phi, rho, psi at the start, as in the simulated drives."""
-START_SIGMA = (0.2, 0.2, 0.6)
 MOUNTING = (_RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD)
 """The same as x and y in metres and yaw in radians."""
 
@@ -126,7 +124,7 @@ def drive_images(drive: Drive, threads: int) -> list[NDArray[np.uint8]]:
 
 def picture_start(seed: int) -> tuple[float, float, float]:
     """Where the camera of a drive is thought to be: x and y in metres, yaw in radians."""
-    phi, rho, psi = np.random.default_rng(seed).normal((_PHI_RAD, _RHO_M, _PSI_RAD), _START_ERRORS)
+    phi, rho, psi = np.random.default_rng(seed).normal((_PHI_RAD, _RHO_M, _PSI_RAD), START_ERRORS)
     return max(rho, 0.05) * math.cos(phi), max(rho, 0.05) * math.sin(phi), phi + psi
 
 

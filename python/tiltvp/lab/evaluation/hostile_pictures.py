@@ -16,9 +16,9 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.hostile_drives import HostileDrive
 from tiltvp.lab.datasets.hostile_pictures import PICTURE_CASES, PictureDrive, told_drive
 from tiltvp.lab.datasets.new import in_order
+from tiltvp.lab.evaluation.calibration import START_SIGMA
 from tiltvp.lab.evaluation.calibration_images import (
     MOUNTING,
-    START_SIGMA,
     PictureExperiment,
     drive_images,
     lines_of,

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from tiltvp.lab.evaluation.line_truth import wrapped
+from tiltvp.lab.evaluation.line_truth import APART_RAD, PIXEL_RAD, wrapped
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,9 +22,6 @@ OPEN: Final = 0
 """The truth does not tell."""
 FALSE: Final = 1
 RIGHT: Final = 2
-
-_PIXEL_RAD: Final = math.radians(0.3)
-_APART_RAD: Final = math.radians(1.5)
 
 
 class _Bearings(Protocol):
@@ -95,7 +91,7 @@ def pair_verdicts(
     `a` and `b` are the edges that lines may be (`Identities`), `bearing_rad` (M,) and `truth` those of frame `b`. OPEN
     is a line of `b` near the edge but taken for another, or, up to 1.5 degrees from it, for none.
     """
-    limits = np.where([bool(other) for other in b], _PIXEL_RAD, _APART_RAD)
+    limits = np.where([bool(other) for other in b], PIXEL_RAD, APART_RAD)
     verdicts = np.full((len(a), len(b)), FALSE, dtype=np.int8)
     for i, edges in enumerate(a):
         places = truth.bearings_rad[np.isin(truth.edges, list(edges))]

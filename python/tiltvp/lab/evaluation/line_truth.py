@@ -21,11 +21,11 @@ TOLERANCE_RAD: Final = math.radians(0.6)
 """How far a line may be from the true edge that it is taken for."""
 _AS_NEAR_RAD: Final = math.radians(0.1)
 """Edges that are farther than the nearest by no more than this may be the line as well."""
-_PIXEL_RAD: Final = math.radians(0.3)
+PIXEL_RAD: Final = math.radians(0.3)
 """One pixel of `mirror_camera` in the mean over a line's elevations (0.25 degrees at its top, 0.4 at the horizon).
 
 An edge is about two pixels wide in a smoothed gradient: edges this close are one line, which is either's."""
-_APART_RAD: Final = math.radians(1.5)
+APART_RAD: Final = math.radians(1.5)
 """A line on no true edge that is this far from where an edge stands is not that edge, whatever else it may be."""
 _CONTRAST_MIN: Final = 0.02
 """Fainter edges drown in noise: no line is taken for one."""
@@ -144,7 +144,7 @@ def _pair(now: _Seen, i: int, before: _Seen, j: int) -> str:
     here, there = now.edges[i], before.edges[j]
     if not here.isdisjoint(there):
         return "correct"
-    least = _PIXEL_RAD if here and there else _APART_RAD
+    least = PIXEL_RAD if here and there else APART_RAD
     away = [_all_apart(*place, least) for place in ((before, j, here), (now, i, there)) if place[2]]
     if here and there:
         return "false_matches" if all(away) else "unknown"
