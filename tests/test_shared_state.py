@@ -160,6 +160,10 @@ LONG = {
         pixels = np.random.default_rng(1).uniform(0.0, 480.0, (4_000_000, 2))
         call = lambda: camera.unproject_jacobian(pixels)
     """,
+    "landmarks": """
+        bearings = np.array([[k, j, 0.01 * k + 0.002 * j] for k in range(14) for j in range(3000)])
+        call = lambda: tiltvp.calibrate(np.full((14, 2), 0.1), bearings, wheel_base_m=0.4)
+    """,
     "estimator": """
         camera = tiltvp.Camera.equidistant(width=8000, height=6000, focal_px=1746, cx=3999.5, cy=2999.5)
         call = lambda: tiltvp.TiltEstimator(camera)

@@ -45,11 +45,11 @@ impl CholeskyFactor {
     }
 
     /// The factor of an information matrix, regularised where rounding makes it indefinite.
-    pub(crate) fn regularised(information: DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn regularised(information: &DMatrix<f64>) -> Option<Self> {
         if let Some(factor) = Self::new(information.clone()) {
             return Some(factor);
         }
-        let mut regularised = information;
+        let mut regularised = information.clone();
         for k in 0..regularised.nrows() {
             regularised[(k, k)] = regularised[(k, k)] * (1.0 + RELATIVE_REGULARISATION) + REGULARISATION;
         }
@@ -123,15 +123,28 @@ pub(crate) fn subtract_square(p: &mut DMatrix<f64>, w: &DMatrix<f64>) {
     mirror(p);
 }
 
-/// Copies the lower triangle of a square matrix into the upper one, tile by tile.
+/// Copies the lower triangle of a square matrix into the upper one.
 pub(crate) fn mirror(p: &mut DMatrix<f64>) {
     let n = p.nrows();
     let values = p.as_mut_slice();
+    for_each_pair(n, |lower, upper| values[upper] = values[lower]);
+}
+
+/// Copies the upper triangle of a square matrix into the lower one.
+pub(crate) fn mirror_upper(p: &mut DMatrix<f64>) {
+    let n = p.nrows();
+    let values = p.as_mut_slice();
+    for_each_pair(n, |lower, upper| values[lower] = values[upper]);
+}
+
+/// Calls `each` with the places of every element below the diagonal and of its mirror image, tile by tile.
+#[inline]
+fn for_each_pair(n: usize, mut each: impl FnMut(usize, usize)) {
     for first in (0..n).step_by(TILE) {
         for top in (first..n).step_by(TILE) {
             for c in first..(first + TILE).min(n) {
                 for r in top.max(c + 1)..(top + TILE).min(n) {
-                    values[r * n + c] = values[c * n + r];
+                    each(c * n + r, r * n + c);
                 }
             }
         }

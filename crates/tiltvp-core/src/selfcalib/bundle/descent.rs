@@ -62,7 +62,7 @@ impl BundleProblem {
     /// Moves all unknowns by the solution of normal equations. Returns the predicted reduction of the cost by the step of the
     /// parameters that were not eliminated. `None`, without a move, where the equations are singular or the step is not finite.
     pub(crate) fn take_step(&mut self, system: &ReducedSystem) -> Option<f64> {
-        let step = CholeskyFactor::regularised(system.equations.information.clone())?.solve(&system.equations.rhs)?;
+        let step = CholeskyFactor::regularised(&system.equations.information)?.solve(&system.equations.rhs)?;
         let predicted_reduction = 0.5 * step.dot(&system.equations.rhs);
         let width = self.width();
         let kept = (step.len() > width).then(|| step.fixed_rows::<3>(0).into());

@@ -6,6 +6,7 @@
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
+use super::cholesky::mirror_upper;
 use super::linearisation::NormalEquations;
 use super::pose_elimination::{EliminatedPose, PoseEquations, eliminate_pose, join};
 use super::problem::BundleProblem;
@@ -168,7 +169,7 @@ impl BundleProblem {
             predicted_reduction += pose.predicted_reduction();
             between.push((last, pose));
         }
-        shared.information.fill_lower_triangle_with_upper_triangle();
+        mirror_upper(&mut shared.information);
         for k in 0..width {
             shared.information[(k, k)] *= 1.0 + damping;
         }

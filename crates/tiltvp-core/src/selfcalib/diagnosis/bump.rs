@@ -107,7 +107,7 @@ impl BundleProblem {
     fn mounting_alone(mut self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         self.levenberg_marquardt(ITERATIONS, TOLERANCE, FIRST_DAMPING);
         let system = self.eliminate_poses(self.keyframes.len() - 1, false, 0.0)?;
-        let covariance: DMatrix<f64> = CholeskyFactor::regularised(system.equations.information)?.inverse();
+        let covariance: DMatrix<f64> = CholeskyFactor::regularised(&system.equations.information)?.inverse();
         Some((self.mounting, covariance.fixed_view::<3, 3>(0, 0).into()))
     }
 }

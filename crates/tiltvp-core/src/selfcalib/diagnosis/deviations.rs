@@ -79,7 +79,7 @@ impl BundleProblem {
             let drop: Vec<usize> = others.flat_map(|(_, (_, columns, _))| columns.clone()).collect();
             let at = own.start - drop.iter().filter(|column| **column < own.start).count();
             let left = system.equations.information.clone().remove_rows_at(&drop).remove_columns_at(&drop);
-            let factor = (!is_free).then(|| CholeskyFactor::regularised(left)).flatten()?;
+            let factor = (!is_free).then(|| CholeskyFactor::regularised(&left)).flatten()?;
             let step = factor.solve(&system.equations.rhs.clone().remove_rows_at(&drop))?;
             let covariance_at = |first: usize, count: usize| {
                 let mut block = DMatrix::zeros(count, count);

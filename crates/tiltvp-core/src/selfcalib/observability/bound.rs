@@ -72,7 +72,7 @@ pub fn cramer_rao_bound(
     let last = problem.keyframes.len() - 1;
     let singular = || Error::argument("observations", "a drive that determines nothing", "bearings of landmarks");
     let system = problem.eliminate_poses(last, false, 0.0).ok_or_else(singular)?;
-    let covariance = CholeskyFactor::regularised(system.equations.information).ok_or_else(singular)?.inverse();
+    let covariance = CholeskyFactor::regularised(&system.equations.information).ok_or_else(singular)?.inverse();
     Ok(covariance.fixed_view::<3, 3>(0, 0).into())
 }
 

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::log::{LogBearing, LogOptions, LogStep, SortedLog};
 use super::triangulation::triangulated;
 use crate::geometry::wrap_angle;
+use crate::interrupt::check;
 use crate::selfcalib::bundle::{BundleProblem, FIRST_DAMPING, FreeParameters, Keyframe, Observation};
 use crate::selfcalib::model::{BearingLoss, RelativeMotion, WheelMotion, compose};
 
@@ -198,16 +199,19 @@ impl<'a> IncrementalProblem<'a> {
 
     /// Initialises the candidates with so many observations that have enough parallax and agree, or that are seen for long.
     fn initialise_landmarks(&mut self, observations: usize, parallax: f64) {
-        let ids: Vec<u64> = self.candidates.keys().copied().collect();
-        for id in ids {
-            let Some(seen) = self.candidates.get(&id).filter(|seen| seen.len() >= observations) else { continue };
+        let o = &self.options.filter;
+        let mut found = Vec::new();
+        for (id, seen) in self.candidates.iter().filter(|(_, seen)| seen.len() >= observations) {
+            check();
             let angle = self.parallax(seen);
-            let (landmark, off) = triangulated(&self.problem, &self.options.filter, seen);
+            let (landmark, off) = triangulated(&self.problem, o, seen);
             let agree = off <= DISAGREEMENT_SHARE * angle + DISAGREEMENT_SIGMAS * self.problem.bearing_sigma;
-            if !(observations == 1 || angle >= parallax && agree || seen.len() >= MOST_OBSERVATIONS) {
-                continue;
+            if observations == 1 || angle >= parallax && agree || seen.len() >= MOST_OBSERVATIONS {
+                found.push((*id, landmark));
             }
-            let o = &self.options.filter;
+        }
+        self.problem.make_room(found.len());
+        for (id, landmark) in found {
             let slot = self.problem.add_landmark(landmark, -o.start_distance_m.ln(), o.start_distance_log_sigma);
             let mut last = 0;
             for (keyframe, bearing) in self.candidates.remove(&id).into_iter().flatten() {

@@ -230,7 +230,7 @@ fn report(
         ));
     }
     let solution = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0).and_then(|system| {
-        let covariance = CholeskyFactor::regularised(system.equations.information.clone())?.inverse();
+        let covariance = CholeskyFactor::regularised(&system.equations.information)?.inverse();
         Some((problem.covariance_widening(&system, &covariance), covariance))
     });
     // No minimum is there: nothing is known beyond the start, and this is no answer.

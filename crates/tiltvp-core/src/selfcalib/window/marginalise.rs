@@ -36,7 +36,7 @@ impl SlidingWindow {
 /// The problem of the keyframes from `at` on and of the landmarks that are kept. Its prior is the information of `system`, the
 /// normal equations of (pose at `at`, shared parameters), in the frame of that pose.
 fn marginalised(problem: &BundleProblem, system: &ReducedSystem, at: usize, kept: &[usize]) -> Option<BundleProblem> {
-    let joint = CholeskyFactor::regularised(system.equations.information.clone())?;
+    let joint = CholeskyFactor::regularised(&system.equations.information)?;
     let ahead = joint.solve(&system.equations.rhs)?;
     let joint = joint.inverse();
     let origin = problem.keyframes[at].pose;
@@ -63,7 +63,7 @@ fn marginalised(problem: &BundleProblem, system: &ReducedSystem, at: usize, kept
         landmarks.push(InverseDistanceLandmark { anchor, direction, log_inverse_distance: old.log_inverse_distance });
     }
     let prior = &by_joint * joint * by_joint.transpose();
-    let prior = CholeskyFactor::regularised(0.5 * (&prior + prior.transpose()))?;
+    let prior = CholeskyFactor::regularised(&(0.5 * (&prior + prior.transpose())))?;
     let mut next = problem.clone();
     next.prior_mean = mean + &by_joint * ahead;
     next.prior_information = prior.inverse();

@@ -92,7 +92,7 @@ impl SlidingWindow {
     /// Takes a solution of the window for mean and covariance; false, and nothing changes, if its equations are singular.
     pub(super) fn adopt(&mut self, solution: &Solution) -> bool {
         let information = solution.system.equations.information.clone();
-        let Some(factor) = CholeskyFactor::regularised(information) else { return false };
+        let Some(factor) = CholeskyFactor::regularised(&information) else { return false };
         self.covariance = factor.inverse();
         self.widening = self.problem.covariance_widening(&solution.system, &self.covariance);
         self.mean = self.problem.shared().insert_rows(0, 3, 0.0);
