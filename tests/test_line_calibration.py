@@ -175,6 +175,16 @@ def test_turns_that_are_as_told_or_not_known_are_no_misreading(drive: Drive, see
         assert line_turns(few).misreading is None
 
 
+@pytest.mark.parametrize("late", [-2, -1, 0, 1])
+def test_lines_tell_how_late_images_are(seen: list[SeenFrame], late: int) -> None:
+    turns = np.roll([one.turn_rad or 0.0 for one in seen], -late).tolist()
+    found = line_turns([replace(one, turn_rad=turn) for one, turn in zip(seen, turns, strict=True)])
+    assert (found.late_frames, found.misreading) == (late, None)
+    words = {-2: "2 frames earlier than", -1: "1 frame earlier than", 0: "", 1: "1 frame later than the odometry"}
+    assert words[late] in found.reason
+    assert (found.reason == "") == (late == 0)
+
+
 def test_wheels_that_are_swapped_are_named(drive: Drive, seen: list[SeenFrame]) -> None:
     swapped = drive.odometry[:, ::-1].copy()
     solve = partial(

@@ -75,7 +75,7 @@ class LineCalibration:
     @property
     def doubt(self) -> str:
         """Why it cannot be relied upon, though the log may fit; empty where nothing speaks against it."""
-        if self.turns.misreading is not None:
+        if self.turns.reason:
             return self.turns.reason
         if not self.settled:
             return "which line is which does not settle with the mounting"

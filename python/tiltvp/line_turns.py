@@ -12,6 +12,7 @@ import numpy as np
 
 from tiltvp._core import match_descriptors, misreading_clause
 from tiltvp.arguments import each_from
+from tiltvp.errors import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,6 +35,11 @@ _CLEARLY: Final = 3.0
 that were misread are told by 4.7 and more; of drives as told no other reading is any nearer."""
 _JUMP_RAD: Final = math.radians(2.0)
 """Of turns from frame to frame 95 % err by less than 1 degree."""
+_LATE_FRAMES: Final = 3
+"""Most frames that images are looked for to be late by."""
+_CHANGE_RAD: Final = math.radians(1.0)
+_LATE_RAD: Final = math.radians(3.0)
+"""Least sum of differences that go if images are late: a turn of 3 degrees a frame that begins."""
 _MISSED_MAX: Final = 0.5
 """Share of the turns of the lines that a reading may miss: those of the 16 miss 0.06 to 0.25, and with another error
 beside, as of a wheel base that is 30 % off, up to 0.5."""
@@ -50,6 +56,9 @@ class LineTurns:
     missed_rad: dict[str, float]
     """Sum of the differences between the two: for the odometry as told, "", and by each other reading, as
     `LogCalibration.misreading` names them."""
+    late_frames: int = 0
+    """By how many frames the images are later than the odometry, where turns that begin and end tell that; earlier if
+    negative."""
     jumps_rad: dict[int, float] = field(default_factory=dict)
     """The turn up to a frame, by its place among them, where lines turn otherwise than told by more than they err: the
     camera was bumped, or a wheel slipped."""
@@ -67,6 +76,10 @@ class LineTurns:
     @property
     def reason(self) -> str:
         """What is wrong with the odometry, in a sentence; empty where nothing is."""
+        if self.misreading is None and self.late_frames:
+            way = "later" if self.late_frames > 0 else "earlier"
+            frames = counted(abs(self.late_frames), "frames")
+            return f"lines turn {frames} {way} than the odometry tells: mend the times, or try estimate_time_offset"
         if self.misreading is None:
             return ""
         missed, as_told = (math.degrees(self.missed_rad[name]) for name in (self.misreading, ""))
@@ -110,7 +123,27 @@ def line_turns(seen: Sequence[SeenFrame]) -> LineTurns:
     differences = {name: missed(values) for name, values in readings.items()}
     off = np.abs(np.remainder(turned - turns[1:] + math.pi, math.tau) - math.pi)
     jumps = {int(k) + 1: float(turned[k]) for k in np.flatnonzero(off > _JUMP_RAD)}
-    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, jumps)
+    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(turned, turns[1:]), jumps)
+
+
+def _late(by_lines: Table, told: Table) -> int:
+    """By how many frames turns by lines (N,) are later than those that were told (N,); 0 where that is not clear.
+
+    Told are only frames at which turns would be others by more than they err: a slip is wrong at two of these, by one
+    way or the other.
+    """
+    found, gained = 0, _LATE_RAD
+    for late in (*range(-_LATE_FRAMES, 0), *range(1, _LATE_FRAMES + 1)):
+        shifted = np.full_like(told, np.nan)
+        if late > 0:
+            shifted[late:] = told[:-late]
+        else:
+            shifted[:late] = told[-late:]
+        change = np.isfinite(by_lines) & (np.abs(shifted - told) > _CHANGE_RAD)
+        as_told, otherwise = (float(np.abs(by_lines - x)[change].sum()) for x in (told, shifted))
+        if as_told - otherwise > gained and _CLEARLY * otherwise < as_told:
+            found, gained = late, as_told - otherwise
+    return found
 
 
 def _turn(before: SeenFrame, now: SeenFrame) -> float:
