@@ -38,6 +38,7 @@ _JUMP_RAD: Final = math.radians(2.0)
 _LATE_FRAMES: Final = 3
 """Most frames that images are looked for to be late by."""
 _CHANGE_RAD: Final = math.radians(1.0)
+"""Frames at which turns would be others by less tell no lateness."""
 _LATE_RAD: Final = math.radians(3.0)
 """Least sum of differences that go if images are late: a turn of 3 degrees a frame that begins."""
 _MISSED_MAX: Final = 0.5
@@ -79,7 +80,8 @@ class LineTurns:
         if self.misreading is None and self.late_frames:
             way = "later" if self.late_frames > 0 else "earlier"
             frames = counted(abs(self.late_frames), "frames")
-            return f"lines turn {frames} {way} than the odometry tells: mend the times, or try estimate_time_offset"
+            remedy = "mend the times, as by frame_delay or --estimate-time-offset"
+            return f"lines turn {frames} {way} than the odometry tells: {remedy}"
         if self.misreading is None:
             return ""
         missed, as_told = (math.degrees(self.missed_rad[name]) for name in (self.misreading, ""))
