@@ -25,6 +25,8 @@ __all__ = ["LineTurns", "line_turns"]
 
 _MATCHES_MIN: Final = 5
 """Lines of two frames that tell a turn: the median of five stands two wrong matches."""
+_FEWEST: Final = 3
+"""Lines that tell whether a turn has begun. With five an office whose images came a frame late was sure and wrong."""
 _STRETCHES: Final = 200
 """Into so many a drive is cut at most. Turns from frame to frame err by 0.2 degrees, which is more than a robot turns
 between many of them."""
@@ -101,7 +103,8 @@ def line_turns(seen: Sequence[SeenFrame]) -> LineTurns:
     known = len(seen) > 1 and all(one.turn_rad is not None for one in seen)
     if not known:
         return LineTurns(0, 0.0, {"": 0.0})
-    turned = np.array([_turn(before, now) for before, now in pairwise(seen)])
+    any_turned, matches = np.array([_turn(before, now) for before, now in pairwise(seen)]).T
+    turned = np.where(matches < _MATCHES_MIN, np.nan, any_turned)
     stretch = np.arange(len(turned)) * min(_STRETCHES, len(turned)) // len(turned)
 
     def summed(values: Table) -> Table:
@@ -125,7 +128,7 @@ def line_turns(seen: Sequence[SeenFrame]) -> LineTurns:
     differences = {name: missed(values) for name, values in readings.items()}
     off = np.abs(np.remainder(turned - turns[1:] + math.pi, math.tau) - math.pi)
     jumps = {int(k) + 1: float(turned[k]) for k in np.flatnonzero(off > _JUMP_RAD)}
-    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(turned, turns[1:]), jumps)
+    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(any_turned, turns[1:]), jumps)
 
 
 def _late(by_lines: Table, told: Table) -> int:
@@ -148,16 +151,16 @@ def _late(by_lines: Table, told: Table) -> int:
     return found
 
 
-def _turn(before: SeenFrame, now: SeenFrame) -> float:
-    """How far the robot turned to the left between two frames, radians; NaN where too few lines tell."""
+def _turn(before: SeenFrame, now: SeenFrame) -> tuple[float, int]:
+    """How far the robot turned to the left between two frames, radians, by how many lines; NaN by too few."""
     pairs = match_descriptors(before.descriptors, now.descriptors)
-    if len(pairs) < _MATCHES_MIN:
-        return math.nan
+    if len(pairs) < _FEWEST:
+        return math.nan, len(pairs)
     moved = before.lines.bearing_rad[pairs[:, 0]] - now.lines.bearing_rad[pairs[:, 1]]
     # The median of angles: that from which all are the least away.
     away = np.abs(np.remainder(moved[:, None] - moved + math.pi, math.tau) - math.pi)
     middle = float(moved[int(np.argmin(away.sum(axis=0)))])
-    return math.remainder(middle, math.tau)
+    return math.remainder(middle, math.tau), len(pairs)
 
 
 def _weighted_median(values: Table, per: Table) -> float:
