@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,19 @@ def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
     code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
     assert (code, complaints) == (0, "")
     assert pl.read_csv(again)["file"][0] == f"{film}#0"
+
+
+def test_a_camera_that_was_bumped_is_told(run: Run, folder: Path, drive: Drive, tmp_path: Path) -> None:
+    bumped = tmp_path / "odometry.csv"
+    turns = drive.motions[:, 1] + np.radians([0.0, 0.0, 0.0, 20.0, 0.0, 0.0])
+    bumped.write_text("file,yaw_rad\n" + "".join(f"{k}.png,{turn!r}\n" for k, turn in enumerate(turns.tolist())))
+    words = ("--camera", folder / "camera.toml", "--out", tmp_path / "t.csv", "--overwrite", "--odometry")
+    _, _, complaints = run("track", folder / "frames", *words, folder / "odometry.csv")
+    assert "bumped" not in complaints
+    code, _, complaints = run("track", folder / "frames", *words, bumped)
+    assert code == 0, complaints
+    said = r"at 1 frame lines turn .* by (19|20)\.\d degrees at .*3\.png: the camera was bumped"
+    assert re.search(said, complaints)
 
 
 def test_a_lean_that_loses_lines_is_not_believed(

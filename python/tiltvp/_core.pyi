@@ -3316,6 +3316,12 @@ class TrackedLines:
         """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
+    def jump_rad(self) -> float:
+        """How much farther to the left than was told the camera turned, radians, where few tracks go on by that alone
+        and most by another turn: it was bumped, or wheels slipped. 0 elsewhere.
+        """
+
+    @property
     def lines(self) -> Lines:
         """The lines."""
 

@@ -6,11 +6,9 @@ turns, or taken for their neighbours, and what is left says that the camera is n
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -125,7 +123,8 @@ def _in_turns(
     """Lines followed from the mounting that they tell, until that does not change any more."""
     (x, y), yaw, before = place_of_longest_tracks(seen, start), start[2], None
     for _ in range(rounds):
-        frames = _followed(seen, LineTracker(camera_m=(x, y), camera_yaw_rad=yaw), turns.jumps_rad)
+        tracker = LineTracker(camera_m=(x, y), camera_yaw_rad=yaw)
+        frames = [one.followed(tracker) for one in seen]
         bearings = bearing_log(frames, frames_min=frames_min)
         if not len(bearings):
             raise InvalidInputError(f"no line is seen in {frames_min} of {len(seen)} frames")
@@ -172,7 +171,8 @@ def place_of_longest_tracks(seen: Sequence[SeenFrame], start: Place) -> tuple[fl
         for place in places:
             if place not in known:
                 tracker = LineTracker(camera_m=at(*place), camera_yaw_rad=start[2], look_back=_LOOK_BACK)
-                _followed(window, tracker)
+                for one in window:
+                    one.followed(tracker)
                 known[place] = tracker.track_count
         return min(places, key=lambda place: (known[place], place[0] ** 2 + place[1] ** 2, place))
 
@@ -194,23 +194,6 @@ def _apart(seen: Sequence[SeenFrame]) -> list[SeenFrame]:
             kept.append(replace(one, turn_rad=turn_rad, distance_m=distance_m))
             turn_rad, distance_m = 0.0, 0.0
     return kept
-
-
-def _followed(
-    seen: Sequence[SeenFrame], tracker: LineTracker, jumps_rad: Mapping[int, float] = MappingProxyType({})
-) -> list[FollowedFrame]:
-    """The lines of all frames. After a jump they are followed by the turn that they tell, where more tracks go on by
-    that: of a camera that was bumped none would, and nothing be left to speak against the log."""
-    frames = []
-    for k, one in enumerate(seen):
-        if k in jumps_rad:
-            known, other = tracker.track_count, copy.copy(tracker)
-            ways = [(one.followed(tracker), tracker), (replace(one, turn_rad=jumps_rad[k]).followed(other), other)]
-            frame, tracker = max(ways, key=lambda way: np.count_nonzero(way[0].tracked.track < known))
-        else:
-            frame = one.followed(tracker)
-        frames.append(frame)
-    return frames
 
 
 def _agree(before: LogCalibration, now: LogCalibration) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -35,8 +35,6 @@ _TURNED_RAD: Final = math.radians(45.0)
 _CLEARLY: Final = 3.0
 """How many times nearer to the turns of the lines than as told another reading has to be. Of 16 rendered drives those
 that were misread are told by 4.7 and more; of drives as told no other reading is any nearer."""
-_JUMP_RAD: Final = math.radians(2.0)
-"""Of turns from frame to frame 95 % err by less than 1 degree."""
 _LATE_FRAMES: Final = 3
 """Most frames that images are looked for to be late by."""
 _CHANGE_RAD: Final = math.radians(1.0)
@@ -62,9 +60,6 @@ class LineTurns:
     late_frames: int = 0
     """By how many frames the images are later than the odometry, where turns that begin and end tell that; earlier if
     negative."""
-    jumps_rad: dict[int, float] = field(default_factory=dict)
-    """The turn up to a frame, by its place among them, where lines turn otherwise than told by more than they err: the
-    camera was bumped, or a wheel slipped."""
 
     @property
     def misreading(self) -> str | None:
@@ -126,9 +121,7 @@ def line_turns(seen: Sequence[SeenFrame]) -> LineTurns:
         per_metre = _weighted_median(by_lines, summed(ways[1:])[told])
         readings["left wheel negated" if per_metre > 0.0 else "right wheel negated"] = per_metre * ways
     differences = {name: missed(values) for name, values in readings.items()}
-    off = np.abs(np.remainder(turned - turns[1:] + math.pi, math.tau) - math.pi)
-    jumps = {int(k) + 1: float(turned[k]) for k in np.flatnonzero(off > _JUMP_RAD)}
-    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(any_turned, turns[1:]), jumps)
+    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(any_turned, turns[1:]))
 
 
 def _late(by_lines: Table, told: Table) -> int:

@@ -16,7 +16,7 @@ from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
-from tiltvp.cli.track import Drive, needed_turns, track_table
+from tiltvp.cli.track import Drive, needed_turns, tell_jumps, track_table
 from tiltvp.errors import InvalidInputError, counted
 from tiltvp.images import read_mask
 
@@ -166,6 +166,7 @@ class PictureLog:
             rows = zip(named, found.frames, strict=True)
             table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
             write_table(table, self.pictures.tracks)
+        tell_jumps(self.name, [(name, one.tracked) for (name, _), one in zip(named, found.frames, strict=True)])
         lines = counted(len(np.unique(found.bearings[:, 1])), "lines")
         say(f"{self.name}: {counted(len(found.bearings), 'bearings')} of {lines}")
         doubt = "; ".join(filter(None, (moved.doubt, found.doubt)))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -119,6 +121,7 @@ def track(
     skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
     lines, tracks = counted(len(table.rows), "lines"), counted(tracker.track_count, "tracks")
     say(f"{out}: {counted(len(tracked), 'frames')}{skipped}, {lines}, {tracks}")
+    tell_jumps(str(out), [(name, lines) for _, name, _, lines in tracked])
     return 1 if drive.bad or frames.problems else 0
 
 
@@ -157,6 +160,17 @@ def needed_turns(motions: FrameMotions | None) -> FrameMotions | None:
     if motions is not None and not motions.turns_known:
         raise InvalidInputError("odometry without turns, expected --wheel-base for that of wheels, or other columns")
     return motions
+
+
+def tell_jumps(source: str, tracked: Sequence[tuple[str, TrackedLines]]) -> None:
+    """Says at which frames, by their names, lines turned otherwise than the odometry told, if there are any."""
+    jumps = [(name, abs(math.degrees(lines.jump_rad))) for name, lines in tracked if lines.jump_rad]
+    if jumps:
+        name, most_deg = max(jumps, key=itemgetter(1))
+        complain(
+            f"{source}: at {counted(len(jumps), 'frames')} lines turn otherwise than the odometry tells, by "
+            f"{most_deg:.1f} degrees at {name}: the camera was bumped, or wheels slipped"
+        )
 
 
 class Drive:

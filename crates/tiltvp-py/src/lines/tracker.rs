@@ -23,6 +23,9 @@ value! {
         frames_back: Vec<i64>,
         /// The lines.
         lines: Lines,
+        /// How much farther to the left than was told the camera turned, radians, where few tracks go on by that alone and
+        /// most by another turn: it was bumped, or wheels slipped. 0 elsewhere.
+        jump_rad: f64,
     }
     check if [track.len(), frames_back.len()] != [lines.inner.lines.len(); 2] {
         let n = lines.inner.lines.len();
@@ -98,14 +101,14 @@ impl LineTracker {
         if n != inner.lines.len() {
             return Err(invalid(format!("descriptors: {n} rows, expected {}, one for each line", inner.lines.len())));
         }
-        let (frame, tracked) = self.inner.change(py, |tracker| {
+        let (frame, tracked, jump_rad) = self.inner.change(py, |tracker| {
             let (frame, mut out) = (tracker.state().next_frame, Vec::new());
-            tracker.update(inner, &values, motion.as_ref(), &mut out)?;
-            Ok((frame, out))
+            let jump_rad = tracker.update(inner, &values, motion.as_ref(), &mut out)?;
+            Ok((frame, out, jump_rad))
         })?;
         let track = tracked.iter().map(|line| line.track as i64).collect();
         let frames_back = tracked.iter().map(|line| i64::from(line.frames_back)).collect();
-        Ok(TrackedLines { frame, track, frames_back, lines: lines.get().clone() })
+        Ok(TrackedLines { frame, track, frames_back, lines: lines.get().clone(), jump_rad })
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -2,6 +2,7 @@
 //! matched with the last frame that shows them.
 
 use super::assignment::{AssignmentScratch, FORBIDDEN, assign};
+use super::jump::{JUMP_LINES, densest};
 use super::parallax::{Motion, Parallax};
 use super::tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
 use crate::error::{Error, Result};
@@ -27,6 +28,7 @@ pub struct LineTracker {
     distances: Vec<f64>,
     pairs: Vec<Option<usize>>,
     offsets: Vec<(f64, f64)>,
+    jumps: Vec<f64>,
 }
 
 /// A line that goes on: its track, and how many frames ago it was seen.
@@ -71,20 +73,23 @@ impl LineTracker {
     /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles, which rise
     /// where matches are `ordered`, lines are of the camera and mounting of those before, the motion is one, and there are numbers left
     /// for the frame and its lines; the tracker is as before.
+    ///
+    /// Returns how much farther to the left than `motion` the camera turned, radians, where few lines go on by that alone and most by
+    /// another turn: it was bumped, or wheels slipped. 0 elsewhere.
     pub fn update(
         &mut self,
         lines: &Lines,
         descriptors: &[f32],
         motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
-    ) -> Result<()> {
+    ) -> Result<f64> {
         lines.check_after(self.state.seen_by, self.options.matching.ordered)?;
         let seen_by = lines.frame.seen_by.or(self.state.seen_by);
         let lines = &lines.lines;
         let width = self.check(lines, descriptors, motion)?;
-        let continued = match motion {
+        let (continued, jump_rad) = match motion {
             Some(motion) => self.follow(lines, descriptors, width, motion),
-            None => self.look_back(lines, descriptors, width),
+            None => (self.look_back(lines, descriptors, width), 0.0),
         };
         let frame = self.state.next_frame;
         out.clear();
@@ -95,7 +100,7 @@ impl LineTracker {
         }
         self.remember(descriptors, width, motion, out);
         self.state.seen_by = seen_by;
-        Ok(())
+        Ok(jump_rad)
     }
 
     /// Each line on the track of the last frame that shows it (section 9.1).
@@ -125,56 +130,27 @@ impl LineTracker {
     }
 
     /// All lines on tracks together, by predicted bearings and descriptors: first with the turn as it is given, then with the
-    /// turn that most tracks agree on.
-    fn follow(&mut self, lines: &[Line], descriptors: &[f32], width: usize, motion: &Motion) -> Vec<Continued> {
-        let Self { options, state, assignment, costs, distances, pairs, offsets, .. } = self;
-        for edge in &mut state.followed {
-            edge.parallax.predict(motion, options);
+    /// turn that most tracks agree on. Also how much farther to the left than given the camera turned, where it jumped.
+    fn follow(&mut self, lines: &[Line], descriptors: &[f32], width: usize, motion: &Motion) -> (Vec<Continued>, f64) {
+        for edge in &mut self.state.followed {
+            edge.parallax.predict(motion, &self.options);
         }
-        let (n, m) = (lines.len(), state.followed.len());
-        let gate = |i: usize, j: usize, turn_variance: f64| {
-            let edge = &state.followed[j].parallax;
-            let off = wrap(lines[i].bearing_rad - edge.bearing_rad);
-            (off, edge.covariance[0] + line_variance(&lines[i], options) + turn_variance)
-        };
-        distances.clear();
-        distances.resize(n * m, f64::NAN);
-        let (mut common, mut turn_variance) = (0.0, options.turn_sigma_rad.powi(2));
-        for pass in 0..2 {
-            costs.clear();
-            for i in 0..n {
-                for (j, edge) in state.followed.iter().enumerate() {
-                    let (off, variance) = gate(i, j, turn_variance);
-                    let squared = wrap(off - common).powi(2) / variance;
-                    // A line does not change sides: what is brighter on the left stays so.
-                    if squared > options.gate_sigmas.powi(2) || lines[i].polarity * edge.polarity < -0.5 {
-                        costs.push(FORBIDDEN);
-                        continue;
-                    }
-                    let distance = &mut distances[i * m + j];
-                    if distance.is_nan() {
-                        let values = &descriptors[i * width..(i + 1) * width];
-                        *distance = descriptor_distance(values, &edge.descriptor);
-                    }
-                    costs.push(if *distance > options.descriptor_max {
-                        FORBIDDEN
-                    } else {
-                        squared
-                            + (*distance / options.descriptor_sigma).powi(2)
-                            + (variance / options.bearing_sigma_rad.powi(2)).ln()
-                    });
-                }
-            }
-            assign(costs, (n, m), options.new_cost, assignment, pairs);
-            if pass == 0 {
-                offsets.clear();
-                let found = pairs.iter().enumerate().filter_map(|(i, j)| Some((i, (*j)?)));
-                offsets.extend(found.map(|(i, j)| gate(i, j, 0.0)));
-                (common, turn_variance) = common_offset(offsets, options.turn_sigma_rad);
-            }
-        }
+        self.distances.clear();
+        self.distances.resize(lines.len() * self.state.followed.len(), f64::NAN);
+        let sigma = self.options.turn_sigma_rad;
+        self.pair(lines, descriptors, width, 0.0, sigma.powi(2));
+        let jump_rad = self.jump(lines, descriptors, width);
+        let Self { options, state, pairs, offsets, .. } = self;
+        offsets.clear();
+        offsets.extend(pairs.iter().zip(lines).filter_map(|(j, line)| {
+            let edge = &state.followed[(*j)?].parallax;
+            Some((wrap(line.bearing_rad - edge.bearing_rad), edge.covariance[0] + line_variance(line, options)))
+        }));
+        let (common, turn_variance) = common_offset(offsets, sigma);
+        self.pair(lines, descriptors, width, common, turn_variance);
+        let Self { options, state, pairs, .. } = self;
         let frame = state.next_frame;
-        let mut continued = vec![None; n];
+        let mut continued = vec![None; lines.len()];
         // The turn that tracks agree on is theirs already: a track that took its inverse distance from it would pull it along, frame
         // after frame. Each takes in its bearing by the turn as it was given.
         for (i, line) in lines.iter().enumerate() {
@@ -182,14 +158,82 @@ impl LineTracker {
             let edge = &mut state.followed[j];
             continued[i] = Some((edge.track, (frame - edge.seen) as u32));
             edge.seen = frame;
-            edge.parallax.covariance[0] += options.turn_sigma_rad.powi(2);
+            edge.parallax.covariance[0] += sigma.powi(2);
             edge.parallax.correct(line.bearing_rad, line_variance(line, options), options);
         }
         for edge in state.followed.iter_mut().filter(|edge| edge.seen != frame) {
             edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + common);
             edge.parallax.covariance[0] += turn_variance;
         }
-        continued
+        (continued, jump_rad)
+    }
+
+    /// Pairs lines and tracks whose predicted bearings are off by `common`, known with a variance. Returns how many go on.
+    fn pair(&mut self, lines: &[Line], descriptors: &[f32], width: usize, common: f64, turn_variance: f64) -> usize {
+        let Self { options, state, assignment, costs, distances, pairs, .. } = self;
+        let m = state.followed.len();
+        costs.clear();
+        for (i, line) in lines.iter().enumerate() {
+            for (j, edge) in state.followed.iter().enumerate() {
+                let variance = edge.parallax.covariance[0] + line_variance(line, options) + turn_variance;
+                let squared = wrap(line.bearing_rad - edge.parallax.bearing_rad - common).powi(2) / variance;
+                if squared > options.gate_sigmas.powi(2) || changes_sides(line, edge) {
+                    costs.push(FORBIDDEN);
+                    continue;
+                }
+                let distance = &mut distances[i * m + j];
+                if distance.is_nan() {
+                    *distance = descriptor_distance(&descriptors[i * width..(i + 1) * width], &edge.descriptor);
+                }
+                costs.push(if *distance > options.descriptor_max {
+                    FORBIDDEN
+                } else {
+                    squared
+                        + (*distance / options.descriptor_sigma).powi(2)
+                        + (variance / options.bearing_sigma_rad.powi(2)).ln()
+                });
+            }
+        }
+        assign(costs, (lines.len(), m), options.new_cost, assignment, pairs);
+        pairs.iter().flatten().count()
+    }
+
+    /// Where fewer than half of the lines go on, and twice as many and more than half would by another turn, pairs them by that.
+    /// Returns by how much that is farther to the left; 0 elsewhere.
+    fn jump(&mut self, lines: &[Line], descriptors: &[f32], width: usize) -> f64 {
+        let Self { options, state, pairs, jumps, .. } = self;
+        let last = |edge: &&Followed| edge.seen + 1 == state.next_frame;
+        let going_on = pairs.iter().flatten().count();
+        let half = state.followed.iter().filter(last).count().min(lines.len()).div_ceil(2);
+        if going_on >= half || half < JUMP_LINES {
+            return 0.0;
+        }
+        jumps.clear();
+        for (i, line) in lines.iter().enumerate() {
+            let values = &descriptors[i * width..(i + 1) * width];
+            let alike = |edge: &&Followed| descriptor_distance(values, &edge.descriptor) <= options.descriptor_max;
+            let edges = state.followed.iter().filter(last).filter(|edge| !changes_sides(line, edge)).filter(alike);
+            jumps.extend(edges.map(|edge| wrap(line.bearing_rad - edge.parallax.bearing_rad)));
+        }
+        let offset = densest(jumps, 2.0 * options.gate_sigmas * options.turn_sigma_rad);
+        let sigma = options.turn_sigma_rad;
+        if offset.is_nan() {
+            return 0.0;
+        }
+        self.turn_tracks(offset);
+        if self.pair(lines, descriptors, width, 0.0, sigma.powi(2)) >= half.max(2 * going_on) {
+            return -offset;
+        }
+        self.turn_tracks(-offset);
+        self.pair(lines, descriptors, width, 0.0, sigma.powi(2));
+        0.0
+    }
+
+    /// Turns the predicted bearings of all tracks.
+    fn turn_tracks(&mut self, by: f64) {
+        for edge in &mut self.state.followed {
+            edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + by);
+        }
     }
 
     /// Keeps the lines of a frame.
@@ -250,6 +294,11 @@ impl LineTracker {
             }
         }
     }
+}
+
+/// Whether a line is no track's, since what is brighter on the left stays so.
+fn changes_sides(line: &Line, edge: &Followed) -> bool {
+    line.polarity * edge.polarity < -0.5
 }
 
 /// The variance of a line's bearing.
