@@ -99,6 +99,21 @@ def test_truth_values_are_no_numbers_of_the_core(call: Any, value: Any) -> None:
         call(value)
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: tiltvp.SelfCalibrator(wheel_base_m=400.0),
+        lambda: tiltvp.calibrate(np.zeros((3, 2)), np.zeros((0, 3)), wheel_base_m=400.0),
+        lambda: tiltvp.wheel_displacements([0.1], [0.1], wheel_base_m=400.0),
+        lambda: Odometry.from_wheels(TIMES, np.stack([TIMES, TIMES], axis=1), wheel_base_m=400.0),
+        lambda: simulate_drive(wheel_base_m=400.0),
+    ],
+)
+def test_millimetres_are_no_wheel_base(call: Any) -> None:
+    with pytest.raises(InvalidInputError, match=r"wheel_base_m = 400.*metres, at most 200"):
+        call()
+
+
 MASKED = np.ma.masked_array(np.eye(3), mask=np.eye(3) > 0.0)
 HIDDEN = np.ma.masked_array(np.ones((48, 64), bool), mask=np.eye(48, 64) > 0.0)
 DESCRIPTORS = np.ma.masked_array(np.eye(3, 192, dtype=np.float32), mask=np.eye(3, 192) > 0.0)

@@ -111,7 +111,7 @@ def refreshed(stub: ast.Module) -> ast.Module:
             document(node, built.__doc__ + options_doc(node.name, node), 4)
     public.sort(key=lambda name: (not name.isupper(), name[0].islower(), name))
     listed = ast.parse(f"__all__ = {public!r}").body[0]
-    kinds = {name: "int" if isinstance(getattr(_core, name), int) else "list[str]" for name in constants}
+    kinds = {name: type(getattr(_core, name)).__name__.replace("list", "list[str]") for name in constants}
     named = [ast.parse(f"{name}: Final[{kind}]").body[0] for name, kind in kinds.items()]
     document_module = ast.Expr(ast.Constant(laid_out(_core.__doc__ or "", 0)))
     stub.body = [listed, *named, *definitions]

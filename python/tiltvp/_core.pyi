@@ -31,6 +31,7 @@ __all__ = [
     "ROOM_KINDS",
     "SIMD_LEVELS",
     "WALL_PATTERNS",
+    "WHEEL_BASE_MAX_M",
     "AffineCorrection",
     "BelievedCorner",
     "CalibrationStep",
@@ -122,6 +123,7 @@ MOST_PIXELS: Final[int]
 ROOM_KINDS: Final[list[str]]
 SIMD_LEVELS: Final[list[str]]
 WALL_PATTERNS: Final[list[str]]
+WHEEL_BASE_MAX_M: Final[float]
 
 @final
 class AffineCorrection:

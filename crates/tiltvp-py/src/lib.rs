@@ -117,6 +117,7 @@ mod _core {
         module.add("LARGEST_SIDE_PX", tiltvp_core::camera::LARGEST_SIDE_PX)?;
         module.add("MOST_COEFFICIENTS", tiltvp_core::camera::MOST_COEFFICIENTS)?;
         module.add("MOST_LANDMARKS", tiltvp_core::selfcalib::MOST_LANDMARKS)?;
+        module.add("WHEEL_BASE_MAX_M", tiltvp_core::selfcalib::WHEEL_BASE_MAX_M)?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::NAMES.to_vec())?;
         module.add("SIMD_LEVELS", tiltvp_core::simd_levels())?;

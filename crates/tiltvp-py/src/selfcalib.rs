@@ -10,7 +10,9 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
 use tiltvp_core::interrupt::check;
-use tiltvp_core::selfcalib::{self as core, LogBearing, LogOptions, SelfCalibratorOptions, WheelMotion};
+use tiltvp_core::selfcalib::{
+    self as core, LogBearing, LogOptions, SelfCalibratorOptions, WHEEL_BASE_MAX_M, WheelMotion,
+};
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
 pub(crate) use self::log::{LogCalibration, misreading_clause};
@@ -236,8 +238,9 @@ pub(crate) fn wheel_displacements<'py>(
     if distances.len() != turns.len() {
         return Err(invalid(format!("heading_change_rad: {} numbers, expected {}", turns.len(), distances.len())));
     }
-    if !(wheel_base_m > 0.0 && wheel_base_m.is_finite()) {
-        return Err(invalid(format!("wheel_base_m = {wheel_base_m}, expected a positive number of metres")));
+    if !(wheel_base_m > 0.0 && wheel_base_m <= WHEEL_BASE_MAX_M) {
+        let expected = format!("a positive number of metres, at most {WHEEL_BASE_MAX_M}");
+        return Err(invalid(format!("wheel_base_m = {wheel_base_m}, expected {expected}")));
     }
     let rows: Vec<[f64; 2]> = distances
         .iter()

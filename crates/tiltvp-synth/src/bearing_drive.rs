@@ -2,8 +2,8 @@
 
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::geometry::wrap_angle;
-use tiltvp_core::options::{NOT_NEGATIVE, POSITIVE};
-use tiltvp_core::selfcalib::{MotionNoise, Mounting, RelativeMotion, WheelMotion, Wheels};
+use tiltvp_core::options::{Above, NOT_NEGATIVE};
+use tiltvp_core::selfcalib::{MotionNoise, Mounting, RelativeMotion, WHEEL_BASE_MAX_M, WheelMotion, Wheels};
 use tiltvp_core::{options, words};
 
 use crate::rng::Rng;
@@ -65,7 +65,7 @@ options! {
         /// Variance of a wheel's displacement per metre (Scaramuzza, Siegwart and Martinelli 2009, eq. 31), metres.
         odometry_k_m: f64 = 1e-5 => NOT_NEGATIVE, "a finite number of zero or more";
         /// Distance between the wheels, metres.
-        wheel_base_m: f64 = 0.4 => POSITIVE, "a positive number of metres";
+        wheel_base_m: f64 = 0.4 => Above(0.0, WHEEL_BASE_MAX_M), "a positive number of metres, at most 200";
         /// Probability that a bearing is that of nothing: anywhere on the circle.
         outliers: f64 = 0.0 => NOT_NEGATIVE, "a finite number of zero or more";
     }

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from cyclopts import Group, Parameter, validators
 
+from tiltvp._core import WHEEL_BASE_MAX_M
 from tiltvp.cli.options import ABOVE_0, AtLeast0, given_words
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
@@ -91,7 +92,7 @@ class MotionOptions:
     the frames are from, if there is one."""
     odometry_topic: str | None = None
     """Its topic in a recording, where that has several: Odometry, JointState or Twist."""
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=200))] = None
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=WHEEL_BASE_MAX_M))] = None
     """Distance between the wheels, metres, for odometry of wheels, and for how much the floor may change in a turn; by
     default that of a robot's file."""
     wheel_radius: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=10))] = None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp._core import WHEEL_BASE_MAX_M
 from tiltvp.arguments import array_from, number_from, refuse_unless, shaped_from, texts_from
 from tiltvp.errors import InvalidInputError, counted
 
@@ -110,8 +111,8 @@ class Odometry:
         wheels = shaped_from(wheels_m, "wheels_m", None, 2)
         yaw = None
         if wheel_base_m is not None:
-            if not 0.0 < number_from(wheel_base_m, "wheel_base_m") < np.inf:
-                raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected a length above 0")
+            if not 0.0 < number_from(wheel_base_m, "wheel_base_m") <= WHEEL_BASE_MAX_M:
+                raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected metres, at most {WHEEL_BASE_MAX_M:g}")
             with np.errstate(over="ignore", invalid="ignore"):
                 yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
         return cls(array_from(times_s, "times_s"), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)

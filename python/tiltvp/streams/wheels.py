@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp._core import WHEEL_BASE_MAX_M
 from tiltvp.arguments import number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.odometry import GAP_MAX_S
@@ -21,9 +22,8 @@ _WRAPS: Final = (2**16, 2**32)
 _EDGE: Final = 1e-6
 """Share of a range by which angles go beyond its ends: those of floats of 32 bits beyond pi."""
 
-_LONGEST_M: Final = {"wheel_base_m": 200.0, "wheel_radius_m": 10.0}
-"""Twice the longest `half_track_m` of `tiltvp.TiltFilter`, and thrice the largest tyres: what is beyond is
-millimetres."""
+_LONGEST_M: Final = {"wheel_base_m": WHEEL_BASE_MAX_M, "wheel_radius_m": 10.0}
+"""The radius is thrice that of the largest tyres: what is beyond is millimetres."""
 
 
 @dataclass(frozen=True, kw_only=True)

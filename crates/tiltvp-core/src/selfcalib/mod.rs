@@ -21,7 +21,7 @@ mod window;
 pub use self::calibrator::{CalibrationStep, SelfCalibrator};
 pub use self::diagnosis::{Cause, Contradictions, Suspect};
 pub use self::estimate::MountingEstimate;
-pub use self::model::{MOST_LANDMARKS, MotionNoise, Mounting, RelativeMotion, WheelMotion, Wheels};
+pub use self::model::{MOST_LANDMARKS, MotionNoise, Mounting, RelativeMotion, WHEEL_BASE_MAX_M, WheelMotion, Wheels};
 pub use self::observability::{FeatureRange, Observability, PureMotion, cramer_rao_bound, observable_dimension};
 pub use self::offline::{LogBearing, LogCalibration, LogOptions, Misreading, calibrate_log};
 pub use self::options::{CalibrationMethod, SelfCalibratorOptions, StartSigma};

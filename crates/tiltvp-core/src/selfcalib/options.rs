@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::mounting::Mounting;
-use super::odometry::MotionNoise;
+use super::odometry::{MotionNoise, WHEEL_BASE_MAX_M};
 use crate::error::{Error, Result};
 use crate::filter::positive_semidefinite;
-use crate::options::{Between, Kind, NOT_NEGATIVE, OptionValue, POSITIVE, Value};
+use crate::options::{Above, Between, Kind, NOT_NEGATIVE, OptionValue, POSITIVE, Value};
 use crate::{options, words};
 
 words! {
@@ -30,7 +30,7 @@ options! {
         /// Which filter.
         method: CalibrationMethod = CalibrationMethod::Default;
         /// Distance between the wheels, metres. It has no default that suits.
-        wheel_base_m: f64 = 1.0 => POSITIVE, "a positive number of metres";
+        wheel_base_m: f64 = 1.0 => Above(0.0, WHEEL_BASE_MAX_M), "a positive number of metres, at most 200";
         /// Standard deviation of a bearing in radians.
         bearing_sigma_rad: f64 = 0.5f64.to_radians() => POSITIVE, "a positive angle in radians";
         /// Variance of a wheel's displacement for each metre of it (eq. 31), metres.

@@ -12,6 +12,6 @@ pub use self::landmark::MOST_LANDMARKS;
 pub(super) use self::landmark::{HomogeneousLandmark, InverseDistanceLandmark, camera_position, landmark_from_bearing};
 pub(super) use self::loss::{BearingLoss, FitSummary, MotionLoss, OUTLIER_SIGMAS};
 pub use self::mounting::Mounting;
-pub use self::odometry::{MotionNoise, RelativeMotion, WheelMotion, Wheels};
+pub use self::odometry::{MotionNoise, RelativeMotion, WHEEL_BASE_MAX_M, WheelMotion, Wheels};
 pub(super) use self::odometry::{information, preintegrate};
 pub(super) use self::planar_pose::{along_arc, arc, between, between_jacobians, compose, compose_jacobians};

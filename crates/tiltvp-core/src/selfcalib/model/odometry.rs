@@ -12,6 +12,9 @@ use super::planar_pose::{compose, compose_jacobians};
 const TREMOR_M: f64 = 5e-4;
 const TREMOR_SIGMAS: f64 = 0.5;
 
+/// The longest distance between two wheels: twice the longest half track of a tilt filter. What is beyond is millimetres.
+pub const WHEEL_BASE_MAX_M: f64 = 200.0;
+
 /// The displacements of the wheels in one step, metres, forward positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
