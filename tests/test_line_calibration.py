@@ -197,6 +197,19 @@ def test_wheels_that_are_swapped_are_named(drive: Drive, seen: list[SeenFrame]) 
         assert words in found.doubt
 
 
+@pytest.mark.parametrize("share", [0.7, 1.05, 1.3])
+def test_lines_tell_how_far_they_turn(drive: Drive, seen: list[SeenFrame], share: float) -> None:
+    """The wheel base is told wrongly: tracks are those of the right one, and the whole log says which that is."""
+    base_m = share * drive.wheel_base_m
+    frames = told(seen, drive.odometry, base_m)
+    assert line_turns(frames).turn_factor == (pytest.approx(share, rel=0.05) if abs(share - 1.0) > 0.1 else 1.0)
+    solve = partial(calibrate, drive.odometry, wheel_base_m=base_m, bearing_sigma_rad=math.radians(0.05))
+    found = calibrate_lines(frames, solve)
+    assert found.settled
+    assert found.whole.mounting.suspect == "wheel_base_m"
+    assert found.whole.mounting.suspect_value == pytest.approx(drive.wheel_base_m, rel=0.06)
+
+
 def test_after_a_jump_lines_are_followed_by_the_turn_that_they_tell(drive: Drive, seen: list[SeenFrame]) -> None:
     """A wheel slips by what turns the robot by six degrees: none of the tracks would go on, and nothing tell."""
     k = len(seen) // 2

@@ -102,6 +102,8 @@ def calibrate_lines(
     turns = line_turns(seen)
     if turns.misreading is not None:
         return replace(_in_turns(seen, solved, start, frames_min, turns, rounds=1), settled=False)
+    # With another wheel base lines turn elsewhere than they are looked for.
+    seen = [one if one.turn_rad is None else replace(one, turn_rad=turns.turn_factor * one.turn_rad) for one in seen]
     found = _in_turns(seen, solved, start, frames_min, turns)
     return replace(found, whole=solved(found.bearings, jackknife_parts=_PARTS))
 

@@ -35,6 +35,9 @@ _TURNED_RAD: Final = math.radians(45.0)
 _CLEARLY: Final = 3.0
 """How many times nearer to the turns of the lines than as told another reading has to be. Of 16 rendered drives those
 that were misread are told by 4.7 and more; of drives as told no other reading is any nearer."""
+_OTHER_FACTOR: Final = 0.1
+"""By how much more or less than told lines have to turn in all to be followed by that: less is made up by what they
+agree on."""
 _LATE_FRAMES: Final = 3
 """Most frames that images are looked for to be late by."""
 _CHANGE_RAD: Final = math.radians(1.0)
@@ -60,6 +63,9 @@ class LineTurns:
     late_frames: int = 0
     """By how many frames the images are later than the odometry, where turns that begin and end tell that; earlier if
     negative."""
+    turn_factor: float = 1.0
+    """How many times as far as told the lines turn, where most do so by at least a tenth more or less, as with another
+    wheel base."""
 
     @property
     def misreading(self) -> str | None:
@@ -121,7 +127,8 @@ def line_turns(seen: Sequence[SeenFrame]) -> LineTurns:
         per_metre = _weighted_median(by_lines, summed(ways[1:])[told])
         readings["left wheel negated" if per_metre > 0.0 else "right wheel negated"] = per_metre * ways
     differences = {name: missed(values) for name, values in readings.items()}
-    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, _late(any_turned, turns[1:]))
+    late, factor = _late(any_turned, turns[1:]), _factor(by_lines, summed(turns[1:])[told])
+    return LineTurns(int(told.sum()), float(np.abs(by_lines).sum()), differences, late, factor)
 
 
 def _late(by_lines: Table, told: Table) -> int:
@@ -142,6 +149,14 @@ def _late(by_lines: Table, told: Table) -> int:
         if as_told - otherwise > gained and _CLEARLY * otherwise < as_told:
             found, gained = late, as_told - otherwise
     return found
+
+
+def _factor(by_lines: Table, told: Table) -> float:
+    """How many times as far as told (N,) lines turn (N,); 1 where it is about that, or not half of them agree."""
+    factor = _weighted_median(by_lines, told)
+    agree = np.abs(by_lines - factor * told) < _OTHER_FACTOR * np.abs(factor * told)
+    is_other = abs(factor - 1.0) > _OTHER_FACTOR and 2.0 * np.abs(told[agree]).sum() > np.abs(told).sum()
+    return factor if is_other else 1.0
 
 
 def _turn(before: SeenFrame, now: SeenFrame) -> tuple[float, int]:
