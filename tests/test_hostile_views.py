@@ -10,11 +10,13 @@ import polars as pl
 import pytest
 
 import tiltvp
-from tiltvp import METHODS
+from tiltvp import METHODS, TiltEstimator
 from tiltvp.cli import main
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
 from tiltvp.lab.datasets.hostile import CASES, UNHARMED, hostile_images
 from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
 from tiltvp.lab.evaluation.hostile import SURE, judge_images, summarise_cases
+from tiltvp.rotations import read_rotation
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +80,26 @@ def test_no_method_is_sure_of_noise(stripes: Panorama) -> None:
     assert table["confidence"].max() < SURE
     reasons = table.filter(method="refined")["reason"]
     assert reasons.str.contains("% of the pixels are edges, by noise or texture").mean() > 0.8
+
+
+@pytest.mark.slow
+def test_edges_of_the_pixel_grid_are_no_verticals(stripes: Panorama) -> None:
+    cases = ("ahead", "ahead, boxes drawn", "ahead, last row repeated")
+    table = judge_images(hostile_images([stripes], count=12, cases=cases)).filter(method="segments")
+    counts = summarise_cases(table).filter(pl.col("case").is_in(cases))
+    assert counts["wrong_and_sure"].max() == 0.0
+    assert counts["right"].to_list() == pytest.approx([100.0, 100.0, 100.0], abs=20.0)
+
+
+def test_what_is_drawn_of_whole_pixels_alone_is_not_believed() -> None:
+    columns = np.array([235, 210, 170, 145, 106, 81, 41, 16], dtype=np.uint8)[np.arange(640) // 80]
+    estimator = TiltEstimator(
+        AHEAD_CAMERAS["pinhole 80"], method="segments", robot_from_camera=read_rotation("forward")
+    )
+    estimate = estimator(np.repeat(columns[None], 480, axis=0))
+    assert estimate
+    assert estimate.confidence <= 0.5
+    assert "100 % of the edge pixels that agree are steps of the pixel grid" in estimate.reason
 
 
 def test_the_table_counts_who_was_wrong_and_sure() -> None:

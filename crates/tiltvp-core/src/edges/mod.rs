@@ -2,6 +2,7 @@
 
 mod detect;
 mod extent;
+mod grid_step;
 mod lift;
 mod options;
 mod prefilter;
@@ -10,6 +11,7 @@ mod ridge;
 
 pub use detect::{Detector, EdgePixels};
 pub(crate) use extent::Extent;
+pub(crate) use grid_step::is_grid_step;
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
 pub use prefilter::Prefilter;

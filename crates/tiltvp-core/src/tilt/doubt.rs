@@ -22,6 +22,11 @@ pub enum Doubt {
         /// The largest lean that is expected, in radians.
         limit_rad: f64,
     },
+    /// The edges that agree are steps of the pixel grid, and no others tell the vertical.
+    OnGrid {
+        /// Share of the edge pixels that agree, in `[0, 1]`.
+        share: f64,
+    },
     /// There are few edges.
     FewEdges {
         /// Edge pixels.
@@ -66,6 +71,12 @@ impl fmt::Display for Doubt {
                 "the lean is beyond tilt_max_rad ({:.3}, {:.0} degrees) and may be larger than it seems: raise tilt_max_rad",
                 limit_rad,
                 limit_rad.to_degrees()
+            ),
+            Self::OnGrid { share } => write!(
+                f,
+                "{:.0} % of the edge pixels that agree are steps of the pixel grid, as of blocks, borders and enlarged pixels: mask them, \
+                 or compress less",
+                100.0 * share
             ),
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")

@@ -102,6 +102,15 @@ def _harmed(harm: Callable[[NDArray[np.uint8], np.random.Generator], NDArray[Any
     return make
 
 
+def _harmed_ahead(harm: Callable[[NDArray[np.uint8], np.random.Generator], NDArray[np.uint8]]) -> Make:
+    """A view ahead, harmed."""
+
+    def make(place: _Place, rng: np.random.Generator) -> Made:
+        return harm(place.view(AHEAD, FORWARD), rng), AHEAD, FORWARD, place.lean
+
+    return make
+
+
 def _bare(draw: Callable[[np.random.Generator], NDArray[np.uint8]]) -> Make:
     """An image of nothing that stands upright, through the upward camera."""
 
@@ -204,6 +213,27 @@ def _noisy(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uin
 
 def _overexposed(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
     return _bytes(image * rng.uniform(2.0, 6.0) + rng.uniform(0.0, 60.0))
+
+
+def _boxes(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Boxes about things, as detectors draw them."""
+    drawn = image.copy()
+    for _ in range(int(rng.integers(2, 9))):
+        u, v, across, down = rng.integers([0, 20, 30, 40], [540, 380, 200, 250]).tolist()
+        cv2.rectangle(drawn, (u, v), (u + across, v + down), float(rng.uniform(150, 255)), 2)
+    return drawn
+
+
+def _cut_off(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """As decoders show an image that is cut off: its last row again and again."""
+    last = int(rng.uniform(0.2, 0.8) * len(image))
+    return np.asarray(np.vstack([image[:last], np.repeat(image[last : last + 1], len(image) - last, axis=0)]))
+
+
+def _compressed(image: NDArray[np.uint8], _: np.random.Generator) -> NDArray[np.uint8]:
+    """JPEG of quality 10."""
+    data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 10])[1]
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
 
 
 _UPWARD_BEARINGS: list[NDArray[np.float32]] = []
@@ -339,6 +369,9 @@ CASES: Final[dict[str, Make]] = {
     "fisheye ahead read as upward": _told(UPWARD, FORWARD, UP),
     "fisheye ahead read as downward": _told(UPWARD, FORWARD, DOWN),
     "fisheye upside down read as upright": _told(UPWARD, FORWARD @ ROLLED @ ROLLED, FORWARD),
+    "ahead, boxes drawn": _harmed_ahead(_boxes),
+    "ahead, last row repeated": _harmed_ahead(_cut_off),
+    "ahead, JPEG of quality 10": _harmed_ahead(_compressed),
 }
 """What is done, by name."""
 

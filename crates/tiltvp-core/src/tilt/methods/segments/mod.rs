@@ -7,6 +7,7 @@ mod aspect;
 mod choice;
 mod choice_weights;
 mod frame;
+mod grid;
 mod hypothesis;
 mod near;
 mod options;
@@ -23,6 +24,7 @@ use self::anywhere::SAME_UP_COS;
 use self::aspect::Aspect;
 use self::choice::AHEAD_SIN;
 use self::frame::{Edge, Frame, STEPS};
+use self::grid::OnGrid;
 use self::hypothesis::Prior;
 use self::near::{Near, NearWork, REFINED};
 pub use self::options::SegmentsOptions;
@@ -158,14 +160,11 @@ impl ImageFitter for SegmentFit {
         let work = segments.get_or_insert_with(|| Box::new(SegmentWork::new(self.finder.scratch(region, &self.edges))));
         let gradients = self.finder.gradients(self.edges.gradient_min);
         self.finder.find(image, region, gradients, None, &mut work.finder, &mut work.segments);
-        let SegmentWork { segments, edges, .. } = &mut **work;
-        edges.clear();
-        let longest = segments.list.iter().take(self.options.segments_max);
-        edges.extend(longest.map(|segment| Edge::new(&self.robot_from_camera, segment)));
+        self.weigh_edges(work);
+        let (fit, on_grid) = self.fit_off_grid(image, work);
         let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
-            self.fit_anywhere(image, work)
+            fit
         } else {
-            let fit = self.fit_near(work);
             let SegmentWork { finder, strong, .. } = &mut **work;
             let vote = self.vote.as_ref().map(|vote| vote.of(&finder.ridge, tables, strong, pixel_work));
             vote.map_or(fit, |vote| fused(&fit, &vote, region.pixels_per_rad()))
@@ -186,7 +185,11 @@ impl ImageFitter for SegmentFit {
             trust,
             centre_off,
         };
-        fit.into_estimate(&seen, &mut pixel_work.trusted)
+        let mut estimate = fit.into_estimate(&seen, &mut pixel_work.trusted);
+        if let Some(on_grid) = on_grid {
+            on_grid.doubt(&mut estimate);
+        }
+        estimate
     }
 
     fn elements(&self, centre: (f32, f32), scratch: &Scratch) -> Vec<EdgeElement> {
@@ -219,6 +222,35 @@ impl ImageFitter for SegmentFit {
 }
 
 impl SegmentFit {
+    /// The longest segments in the robot frame.
+    fn weigh_edges(&self, work: &mut SegmentWork) {
+        let SegmentWork { segments, edges, .. } = work;
+        edges.clear();
+        let longest = segments.list.iter().take(self.options.segments_max);
+        edges.extend(longest.map(|segment| Edge::new(&self.robot_from_camera, segment)));
+    }
+
+    fn fit_straight(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> Fit {
+        if self.tilt_max_rad > NEAR_MAX_RAD { self.fit_anywhere(image, work) } else { self.fit_near(work) }
+    }
+
+    /// The fit to all edges, or where steps of the pixel grid are much of what agrees and the others tell another vertical, to the
+    /// others; and a doubt where these tell none.
+    fn fit_off_grid(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> (Fit, Option<OnGrid>) {
+        let fit = self.fit_straight(image, work);
+        let Some(on_grid) = OnGrid::of(image, work).filter(|_| fit.tilt.is_some()) else { return (fit, None) };
+        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
+        grid::leave_out(image, work);
+        let others = self.fit_straight(image, work);
+        self.weigh_edges(work);
+        if grid::contradicts(&others, &fit) {
+            return (others, None);
+        }
+        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
+        let tells = others.tilt.is_some() && others.covariance.is_some();
+        (fit, (!tells).then_some(on_grid))
+    }
+
     /// The most likely of the frames about the leans that most edges near the upright agree with.
     fn fit_near(&self, work: &mut SegmentWork) -> Fit {
         let SegmentWork { edges, weighed, near, .. } = work;

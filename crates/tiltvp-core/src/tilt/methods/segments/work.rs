@@ -19,6 +19,8 @@ pub(in crate::tilt) struct SegmentWork {
     pub(super) edges: Vec<Edge>,
     /// Of those that may be vertical: their numbers, and the probability of being vertical by the last fit.
     pub(super) weighed: Vec<(u32, f64)>,
+    /// The same by the fit to all edges, where steps of the pixel grid are then left out.
+    pub(super) weighed_with_grid: Vec<(u32, f64)>,
     pub(super) search: Search,
     /// Levels of the sample.
     pub(super) levels: Vec<f32>,
@@ -34,6 +36,7 @@ impl SegmentWork {
             strong: EdgePixels::default(),
             edges: Vec::new(),
             weighed: Vec::new(),
+            weighed_with_grid: Vec::new(),
             search: Search::default(),
             levels: Vec::new(),
             near: NearWork::default(),
