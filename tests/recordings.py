@@ -134,11 +134,18 @@ class Bag:
             writer.write(connections[topic], round(time_s * 1e9), serialize(message, name))
 
 
-def write_video(path: Path, images: Iterable[np.ndarray], times_ms: Sequence[int], *, codec: str = "mpeg4") -> None:
-    """A video whose frames have their own times, (H, W, 3) uint8 BGR each."""
+def write_video(
+    path: Path,
+    images: Iterable[np.ndarray],
+    times_ms: Sequence[int],
+    *,
+    codec: str = "mpeg4",
+    options: dict[str, str] | None = None,
+) -> None:
+    """A video whose frames have their own times, (H, W, 3) uint8 BGR each; with options of the codec."""
     base = Fraction(1, 1000)
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=30)
+        stream = container.add_stream(codec, rate=30, options=options or {})
         stream.time_base = stream.codec_context.time_base = base
         for number, (image, time_ms) in enumerate(zip(images, times_ms, strict=True)):
             frame = av.VideoFrame.from_ndarray(image, format="bgr24")

@@ -1,4 +1,4 @@
-"""Where frames come from: images with their times, videos with theirs, bags of ROS; and files that are none of them."""
+"""Where frames come from: images with their times, bags of ROS; and files that are none of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 
 import tiltvp
 from recordings import KINDS, START_S, Bag, write_video
-from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError, counted
+from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError
 from tiltvp.streams import (
     NamedImages,
     RawImages,
@@ -30,7 +30,6 @@ from tiltvp.streams import (
 from tiltvp.streams.bag_motion import bag_odometry
 
 RNG = np.random.default_rng(5)
-TIMES_MS = np.cumsum([40, 13, 200, 57, 33, 90, 41, 150, 22, 71, 66, 34]).tolist()
 
 
 def shade(k: int) -> np.ndarray:
@@ -287,48 +286,6 @@ def test_without_the_extras(package: str, tmp_path: Path, monkeypatch: pytest.Mo
     else:
         with pytest.raises(MissingExtraError, match=r"tiltvp\[bags\]"):
             open_frames(bag)
-
-
-@pytest.mark.parametrize(("ending", "codec"), [("mp4", "mpeg4"), ("mkv", "libx264"), ("avi", "mjpeg")])
-def test_videos_have_their_own_times(ending: str, codec: str, tmp_path: Path) -> None:
-    path = tmp_path / f"drive.{ending}"
-    if codec == "mjpeg":
-        from tiltvp.videos import video_writer
-
-        with video_writer(path, 20.0) as writer:
-            for k in range(12):
-                writer.add(shade(k))
-        times = np.arange(12) / 20.0
-    else:
-        write_video(path, map(shade, range(12)), TIMES_MS, codec=codec)
-        times = np.array(TIMES_MS) / 1e3
-    frames = open_frames(path)
-    assert frames.count == 12
-    # Containers may begin their clock with the first frame.
-    assert frames.times_s - frames.times_s[0] == pytest.approx(times - times[0], abs=6e-4)
-    shown = [int(np.median(frame.read())) for frame in frames]
-    assert np.abs(np.array(shown) - 20 * np.arange(12)).max() < 8
-    assert [frame.time_s for frame in frames] == frames.times_s.tolist()
-    for number, frame in zip((2, 5, 11), frames.sample([2, 5, 11]), strict=True):
-        assert frame.name == frames.names[number] == f"{path}#{number:02d}"
-        assert abs(int(np.median(frame.read())) - 20 * number) < 8
-
-
-def test_a_video_that_is_damaged_within_keeps_its_frames_in_their_places(tmp_path: Path) -> None:
-    path = tmp_path / "drive.mkv"
-    noisy = [RNG.integers(0, 256, (48, 64, 3), np.uint8) for _ in range(12)]
-    write_video(path, noisy, TIMES_MS)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2 : len(content) // 2 + 3000] = bytes(3000)
-    path.write_bytes(bytes(content))
-    frames = open_frames(path)
-    assert len(list(frames)) == frames.count <= 12
-    assert frames.notes == ()
-    path.write_bytes(bytes(content[: len(content) // 3]))
-    frames = open_frames(path)
-    assert 0 < frames.count < 12
-    assert frames.notes == (f"{path}: ends before its end, after {counted(frames.count, 'frames')} (cut off?)",)
-    assert len(list(frames)) == frames.count
 
 
 def test_a_drive_s_folder_and_times_of_images(tmp_path: Path) -> None:

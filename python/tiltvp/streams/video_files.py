@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,6 +23,8 @@ __all__ = ["VIDEO_ENDINGS", "open_video"]
 
 VIDEO_ENDINGS: Final = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
 _DAMAGED: Final = "cannot be decoded"
+_NO_SEEKING: Final = "mpeg"
+"""Program streams of MPEG, in which seeking does not lead to key frames."""
 _MATROSKA: Final = b"\x1a\x45\xdf\xa3"
 _SEGMENT: Final = b"\x18\x53\x80\x67"
 _SEGMENT_WITHIN: Final = 128
@@ -53,20 +56,23 @@ class _Video(Frames):
         with _opened(path) as container:
             stream = container.streams.video[0]
             _check_size(path, stream.codec_context.width, stream.codec_context.height)
-            stamps, complete = _stamps(container, stream)
+            stamps, keys, complete = _stamps(container, stream)
             if not stamps:
                 raise ImageFileError(f"{path}: a video without frames, expected at least one")
             rate = stream.average_rate
+            seeks = container.format.name != _NO_SEEKING
             base = None if stream.time_base is None or any(stamp is None for stamp in stamps) else stream.time_base
         self.names = _names(path, len(stamps))
         notes = []
         self._stamps: list[int] | None = None
+        self._keys: list[int] = []
         if base is None:
             self.rate_hz = float(rate) if rate else DEFAULT_RATE_HZ
             self.times_s = np.arange(len(stamps)) / self.rate_hz
             notes.append(f"{path}: its frames have no time stamps; {self.rate_hz:.6g} a second are assumed")
         else:
             self._stamps = sorted(stamp for stamp in stamps if stamp is not None)
+            self._keys = sorted(stamp for stamp in keys if stamp is not None) if seeks else []
             self.times_s = np.array([float(stamp * base) for stamp in self._stamps])
             self.rate_hz = median_rate_hz(self.times_s)
         if not complete or _is_cut_off(path):
@@ -74,36 +80,33 @@ class _Video(Frames):
         self.notes = tuple(notes)
 
     def __iter__(self) -> Iterator[Frame]:
+        """Frames in the places that their stamps have; what is missing cannot be decoded."""
         with _opened(self._path) as container:
-            yield from self._filled(_decoded(container), 0, self.count or 0)
+            count, at = self.count or 0, 0
+            for number, frame in self._numbered(_decoded(container)):
+                if at <= number < count:
+                    yield from map(self._missing, range(at, number))
+                    yield self._frame(number, frame)
+                    at = number + 1
+            yield from map(self._missing, range(at, count))
 
     def sample(self, numbers: Sequence[int]) -> Iterator[Frame]:
-        """Those frames, each from the key frame before it."""
-        if self._stamps is None:
+        """Those frames, decoded from the key frame before them, once for all that follow one."""
+        if self._stamps is None or not self._keys:
             yield from super().sample(numbers)
             return
         with _opened(self._path) as container:
-            stream = container.streams.video[0]
+            coming: Iterator[tuple[int, av.VideoFrame]] = iter(())
+            at, begun = -1, None
             for number in self._these(numbers):
-                container.seek(self._stamps[number], stream=stream, backward=True)
-                yield from self._filled(_decoded(container), number, number + 1)
-
-    def _filled(self, decoded: Iterator[av.VideoFrame], first: int, end: int) -> Iterator[Frame]:
-        """The frames from the first on, in the places that their stamps have; what is missing cannot be decoded."""
-        at = first
-        for number, frame in self._numbered(decoded):
-            if number >= end:
-                break
-            if number < at:
-                continue
-            for k in range(at, number):
-                yield self._missing(k)
-            yield self._frame(number, frame)
-            at = number + 1
-            if at == end:
-                return
-        for k in range(at, end):
-            yield self._missing(k)
+                stamp = self._stamps[number]
+                # To the key frame itself: from a frame shown before it but stored after it, seeking leads to the next.
+                key = self._keys[max(0, bisect_right(self._keys, stamp) - 1)]
+                if key != begun or number <= at:
+                    container.seek(min(key, stamp), stream=container.streams.video[0], backward=True)
+                    coming, begun = self._numbered(_decoded(container)), key
+                at, frame = next((one for one in coming if one[0] >= number), (len(self._stamps), None))
+                yield self._missing(number) if frame is None or at > number else self._frame(number, frame)
 
     def _numbered(self, decoded: Iterator[av.VideoFrame]) -> Iterator[tuple[int, av.VideoFrame]]:
         places = None if self._stamps is None else {stamp: k for k, stamp in enumerate(self._stamps)}
@@ -156,16 +159,22 @@ def _check_size(path: Path, width: int, height: int) -> None:
         raise ImageFileError(f"{path}: {width} x {height} pixels, expected 1 to {_core.MOST_PIXELS} in all")
 
 
-def _stamps(container: Any, stream: Any) -> tuple[list[int | None], bool]:
-    """When each packet is shown, in the order of the file, and whether the file was read to its end."""
+def _stamps(container: Any, stream: Any) -> tuple[list[int | None], list[int | None], bool]:
+    """When each packet is shown, in the order of the file, and those of key frames; whether the file was read to its
+    end."""
     import av
 
-    found: list[int | None] = []
+    found: list[tuple[int | None, bool]] = []
+    complete = True
     try:
-        found.extend(packet.pts for packet in container.demux(stream) if packet.size and not packet.is_corrupt)
+        found.extend(
+            (packet.pts, packet.is_keyframe)
+            for packet in container.demux(stream)
+            if packet.size and not packet.is_corrupt
+        )
     except av.FFmpegError:
-        return found, False
-    return found, True
+        complete = False
+    return [stamp for stamp, _ in found], [stamp for stamp, is_key in found if is_key], complete
 
 
 def _is_cut_off(path: Path) -> bool:
