@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import errno
-import glob
 import os
+import re
 import stat
 import sys
 from collections.abc import Callable, Iterator
@@ -31,6 +31,7 @@ __all__ = [
     "write_whole",
 ]
 
+_HEX: Final = re.compile("[0-9a-f]{16}")
 _KEEPS: Final[ContextVar[bool]] = ContextVar("keeps", default=False)
 
 
@@ -219,8 +220,7 @@ def _new_folder(part: Path) -> int:
 def _locked_beside(target: Path, ending: str, make: Callable[[Path], int]) -> tuple[Path, int]:
     """A part beside the target that is locked as long as its handle is open, so that a dead process's is known."""
     stem = target.name.removesuffix(ending)
-    _sweep(target.parent, f".{stem}.", f".part{ending}")
-    _sweep(target.parent, f".{stem}.", ".old")
+    _sweep(target.parent, f".{stem}.", (f".part{ending}", ".old"))
     while True:
         part = target.with_name(f".{stem}.{os.urandom(8).hex()}.part{ending}")
         handle = make(part)
@@ -243,14 +243,22 @@ def _remove(part: Path) -> None:
     shutil.rmtree(part, ignore_errors=True)
 
 
-def _sweep(folder: Path, begin: str, end: str) -> None:
+def _sweep(folder: Path, begin: str, ends: tuple[str, ...]) -> None:
     """Removes the parts of processes that were killed."""
-    for left in folder.glob(f"{glob.escape(begin)}{'[0-9a-f]' * 16}{glob.escape(end)}"):
+    try:
+        # Once, and without patterns: pictures are written beside all those before them.
+        names = os.listdir(folder)
+    except OSError:
+        return  # One may write where one may not look.
+    random = slice(len(begin), len(begin) + 16)
+    for name in names:
+        if not (name.startswith(begin) and name[random.stop :] in ends and _HEX.fullmatch(name[random])):
+            continue
         with suppress(OSError):
-            handle = os.open(left, os.O_RDONLY)
+            handle = os.open(folder / name, os.O_RDONLY)
             try:
                 _lock(handle)
-                _remove(left)
+                _remove(folder / name)
             finally:
                 os.close(handle)
 

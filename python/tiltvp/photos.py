@@ -7,6 +7,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.errors import ImageFileError
@@ -197,6 +198,11 @@ def jpeg_quality(data: bytes) -> int:
     table = next(_luminance(_parsed(data).head), None)
     if table is None:
         raise ImageFileError("a JPEG file without tables of its quality")
+    return _quality_of(table)
+
+
+@lru_cache
+def _quality_of(table: tuple[int, ...]) -> int:
     return min(range(1, 101), key=lambda quality: (_apart(_steps(quality), table), -quality))
 
 
