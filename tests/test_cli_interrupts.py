@@ -1,10 +1,12 @@
-"""Ctrl-C."""
+"""Ctrl-C, and frames that come one by one."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -13,6 +15,9 @@ import pytest
 
 import tiltvp
 from commands import Run
+from tiltvp.cli.sources import ending_at_interrupt
+from tiltvp.errors import ImageFileError
+from tiltvp.streams import Frame, Frames
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -53,3 +58,30 @@ def test_a_live_camera_ends_at_an_interrupt(
     assert (code, [row["file"] for row in rows]) == (0, [f"camera 2#{k:06d}" for k in range(3)])
     assert rows[0]["taken_s"] < rows[1]["taken_s"] < rows[2]["taken_s"]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_frames_that_are_there_are_decoded_while_one_is_worked_on_and_come_in_order(tmp_path: Path) -> None:
+    class Told(Frames):
+        source, names = "told", [str(number) for number in range(40)]
+
+        def __iter__(self) -> Iterator[Frame]:
+            return (Frame(str(k), None, lambda k=k: self.image(k)) for k in range(40))  # type: ignore[misc]
+
+        def image(self, number: int) -> np.ndarray:
+            begun[number].set()
+            if number == 7:
+                raise ImageFileError("7: broken")
+            return np.full((4, 4), number, np.uint8)
+
+    begun = [threading.Event() for _ in range(40)]
+    before = threading.active_count()
+    with ending_at_interrupt(Told()) as coming:
+        for number, frame in enumerate(coming):
+            assert frame.name == str(number)
+            assert begun[min(number + 1, 39)].wait(10.0)
+            # Frames of a long drive do not fill the memory.
+            assert not begun[min(number + 20, 39)].is_set() or number > 19
+            assert isinstance(frame.image, ImageFileError) if number == 7 else frame.image[0, 0] == number
+            if number == 30:
+                break
+    assert threading.active_count() == before

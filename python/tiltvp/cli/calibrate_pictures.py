@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import CameraOptions, Switch, given_words
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
 from tiltvp.cli.track import Drive, needed_turns, tell_jumps, track_table
@@ -182,11 +182,8 @@ class PictureLog:
         extractor = self.lines.extractor(self.camera, rotation=rotation)
         drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), self.moved)
         count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
-        with progress_bar(count, f"{self.name}: lines") as bar:
-            seen = [
-                ((frame.name, frame.time_s), replace(one, gray=nothing))
-                for frame, one in drive.seen(iter(self.frames), bar)
-            ]
+        with ending_at_interrupt(self.frames) as coming, progress_bar(count, f"{self.name}: lines") as bar:
+            seen = [((frame.name, frame.time_s), replace(one, gray=nothing)) for frame, one in drive.seen(coming, bar)]
         self.bad = drive.bad
         if drive.leaning:
             say(f"{self.name}: of {counted(count, 'frames')} {drive.told()}")

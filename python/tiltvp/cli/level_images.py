@@ -11,7 +11,7 @@ from tiltvp.cli.cluster import Task, on_cluster
 from tiltvp.cli.filtering import FilterOptions, Judge
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome, outcome_table
-from tiltvp.cli.sources import picture_names
+from tiltvp.cli.sources import ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
@@ -166,8 +166,8 @@ def write_images(
 ) -> tuple[int, int]:
     """Writes level images into a folder, JPEG as JPEG, others as PNG; how many of how many were made level."""
     judge, levelled = work.filtering.judge(), 0
-    with progress_bar(len(frames.files), "images") as bar:
-        for frame, name, motion in zip(frames, picture_names(frames), motions, strict=False):
+    with ending_at_interrupt(frames) as coming, progress_bar(len(frames.files), "images") as bar:
+        for frame, name, motion in zip(coming, picture_names(frames), motions, strict=False):
             _, problem = _level(frame, motion, folder / name, work, judge)
             if problem is None:
                 levelled += 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import repeat
 from pathlib import Path
@@ -22,11 +21,12 @@ from tiltvp.cli.sources import (
     SourceOptions,
     check_apart,
     ending_at_interrupt,
+    in_order,
     picture_names,
     wheel_base_of,
 )
 from tiltvp.cli.tables import STDOUT, Out, json_lines
-from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
+from tiltvp.cli.terminal import complain, named, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
 from tiltvp.errors import InvalidInputError, counted
 from tiltvp.files import check_output_folder
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frame, Frames
 
     Picture = NDArray[np.uint8]
-    Done = tuple[Outcome, Picture | None]
     Named = tuple[Frame, str, Outcome, Picture | None]
 
 _LAST: Final = 1_000
@@ -117,7 +116,7 @@ def tilt(
     answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)
     with (
         showing.watch(frames, lambda: work.leveller) as watch,
-        ending_at_interrupt(frames) as coming,
+        ending_at_interrupt(frames, ahead=threads == 1) as coming,
         closing(_done(work, coming, frames, threads)) as done,
     ):
         for (frame, name, found, marked), driven in zip(done, motions, strict=False):
@@ -230,33 +229,15 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
 def _done(work: Work, coming: Iterator[Frame], frames: Frames, threads: int) -> Generator[Named, None, None]:
     """The frames with names, outcomes and marked images, in their order, each as soon as it is there."""
     named_frames = zip(coming, picture_names(frames), strict=False)
+
+    def one(named_frame: tuple[Frame, str]) -> Named:
+        return *named_frame, *work(*named_frame)
+
+    # Of a live camera each frame is answered before the next comes.
     with progress_bar(frames.count or 0, "images") as bar:
-        if threads == 1:
-            for frame, name in named_frames:
-                yield frame, name, *_noted(work(frame, name), bar)
-            return
-        pool = ThreadPoolExecutor(threads)
-        # As many more than can be worked on wait decoded; a source may have more frames than the memory holds.
-        waiting: deque[tuple[Frame, str, Future[Done]]] = deque()
-        try:
-            for frame, name in named_frames:
-                waiting.append((frame, name, pool.submit(work, frame, name)))
-                if len(waiting) > 2 * threads:
-                    yield _first(waiting, bar)
-            while waiting:
-                yield _first(waiting, bar)
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _first(waiting: deque[tuple[Frame, str, Future[Done]]], bar: ProgressBar) -> Named:
-    frame, name, done = waiting.popleft()
-    return frame, name, *_noted(done.result(), bar)
-
-
-def _noted(done: Done, bar: ProgressBar) -> Done:
-    outcome, _ = done
-    if outcome.error is not None:
-        bar.complain(named(outcome.file, outcome.error))
-    bar.advance()
-    return done
+        done = map(one, named_frames) if threads == 1 else in_order(one, named_frames, threads)
+        for frame, name, outcome, picture in done:
+            if outcome.error is not None:
+                bar.complain(named(outcome.file, outcome.error))
+            bar.advance()
+            yield frame, name, outcome, picture
