@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -85,3 +87,13 @@ def test_frames_that_are_there_are_decoded_while_one_is_worked_on_and_come_in_or
             if number == 30:
                 break
     assert threading.active_count() == before
+
+
+def test_an_interrupt_before_a_command_begins_is_told_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "cyclopts.py").write_text("raise KeyboardInterrupt")
+    words = [sys.executable, "-m", "tiltvp", "--help"]
+    path = os.pathsep.join([str(tmp_path), str(Path(tiltvp.__file__).parents[1])])
+    done = subprocess.run(
+        words, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "tiltvp: interrupted\n")

@@ -12,7 +12,7 @@ import pytest
 
 import tiltvp
 from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, photographed, pose
-from tiltvp.cli.app import main
+from tiltvp.cli import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.synth import Room, StereoSequence, zed_cameras

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.cli.app import main
+from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.overlays.segments import draw_segments, segment_pixels
 from tiltvp.rotations import rotation_from

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import tiltvp
-from tiltvp.cli.app import main
+from tiltvp.cli import main
 from tiltvp.lab.evaluation.combinations import PIXEL_METHODS
 from tiltvp.lab.evaluation.striding import stride_views, summarise_strides
 from tiltvp.lab.evaluation.views import room_views

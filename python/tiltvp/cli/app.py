@@ -21,11 +21,11 @@ from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, Til
 from tiltvp.files import keeping_existing
 from tiltvp.streams.outputs.viewer import VIEWER
 
-__all__ = ["app", "main"]
+__all__ = ["app", "run_words"]
 
 _OVERWRITE = "--overwrite"
 """Anywhere in the line: every command that writes keeps what exists without it."""
-SOME_FAILED, WRONG_USE, INTERRUPTED = 1, 2, 130
+SOME_FAILED, WRONG_USE = 1, 2
 
 app.command(setup.setup)
 app.command(tilt.tilt)
@@ -46,11 +46,8 @@ app.command(measure.app)
 app.command(report.report)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line and gives the exit code.
-
-    0 done, 1 some failed, an extra is missing or an output cannot be written, 2 wrong use.
-    """
+def run_words(arguments: Sequence[str] | None) -> int:
+    """Runs the words of a command line, by default those of the process, and gives the exit code."""
     open_closed_streams()
     print_any_name()
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -86,9 +83,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TiltvpError as error:
         complain(str(error))
         return WRONG_USE
-    except KeyboardInterrupt:
-        complain("interrupted")
-        return INTERRUPTED
     except OSError as error:
         # Nothing more may be written to the output, not even at exit. Whoever reads a pipe may have seen enough.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
