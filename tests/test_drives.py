@@ -147,3 +147,12 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert code == 0
     assert "3 frames" in capsys.readouterr().out
     assert len(list((out / "images").glob("*.png"))) == 3
+    assert main(["dataset", "check", str(out)]) == 0
+    for name, line, told in (
+        ("poses.csv", "1,x", "line 3: 2 cells"),
+        ("odometry.csv", "000001.png,x,0,0,0", "left_m = 'x'"),
+    ):
+        rows = (out / name).read_text().splitlines()
+        (out / name).write_text("\n".join([*rows[:2], line, *rows[3:]]))
+        assert main(["dataset", "check", str(out)]) == 1
+        assert told in capsys.readouterr().out

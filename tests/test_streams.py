@@ -302,6 +302,7 @@ def test_a_drive_s_folder_and_times_of_images(tmp_path: Path) -> None:
     for text, words in (
         ("file,time_s\n0.png,7\n", "no time of .*1.png .2 missing"),
         ("file,time_s\n0.png,x\n", "line 2"),
+        ("file,time_s\n0.png,1_0\n", "time_s = '1_0', expected a finite number"),
     ):
         (tmp_path / "frames.csv").write_text(text)
         with pytest.raises(InvalidInputError, match=words):
@@ -328,6 +329,8 @@ def test_what_is_not_there_is_told(tmp_path: Path) -> None:
         open_frames([tmp_path / "a.png", tmp_path / "b.mp4"])
     with pytest.raises(InvalidInputError, match="zero byte"):
         open_frames("a\0b")
+    with pytest.raises(InvalidInputError, match="letters that a file's name can have"):
+        open_frames("\ud800x")
 
 
 def test_names_on_stdin(tmp_path: Path) -> None:

@@ -64,12 +64,16 @@ def each_from(values: Any, name: str, has: str, kind: str, *, or_none: bool = Fa
 
 
 def path_from(path: str | os.PathLike[str]) -> Path:
-    """A path; bytes are none, nor is an empty text, of which `Path` would make the working folder.
+    """A path; bytes are none, nor is an empty text, of which `Path` would make the working folder, nor one with half
+    of a surrogate pair, which no file's name has.
 
     Raises `InvalidInputError`.
     """
     if isinstance(path, str | os.PathLike) and isinstance(name := os.fspath(path), str) and name:
-        return Path(name)
+        with suppress(UnicodeEncodeError):
+            os.fsencode(name)
+            return Path(name)
+        raise InvalidInputError(f"path = {name!r}, expected letters that a file's name can have")
     raise InvalidInputError(f"path = {path!r}, expected a str or an os.PathLike that is not empty")
 
 

@@ -58,6 +58,10 @@ REFUSALS: dict[str, tuple[str, str]] = {
     "wrong type": (edited("kalibr", ("[210.5, 211.25, 318.5, 241.75]", "high")), "found 'high', expected a number"),
     "underscore": (edited("camodocal", ("210.5", "2_1_0.5")), "found '2_1_0.5', expected a number"),
     "fraction of a pixel": (edited("camodocal", ("640", "640.5")), "expected a whole number, at image_width"),
+    "a list for a side": (
+        edited("own", ("width = 640", "width = [640]")),
+        "a list of 1, expected a number, at camera[0].width",
+    ),
     "zero width": (edited("camodocal", ("640", "0")), "width = 0, expected 1 to 100000 pixels"),
     "negative focal": (
         edited("camodocal", ("mu: 210.5", "mu: -210.5")),

@@ -108,7 +108,7 @@ class Node:
 
     def integer(self) -> int:
         """The value as a whole number; 1280.0 counts."""
-        number = self.number()
+        number = self._number(self.value)
         if number != math.floor(number) or abs(number) > 1e9:
             self.fail(f"found {_shown(self.value)}", "a whole number")
         return int(number)

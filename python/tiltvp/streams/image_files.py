@@ -170,10 +170,7 @@ def _table_times(path: Path, column: str, files: Sequence[Path]) -> NDArray[np.f
     which, when = table.header.index(column), table.header.index("time_s")
     rows: dict[str, dict[str, float]] = {}
     for line, cells in table.rows():
-        try:
-            when_s = float(cells[when])
-        except ValueError:
-            raise InvalidInputError(f"{table.where(line)}: time_s = {cells[when]!r}, expected a number") from None
+        when_s = table.number(line, "time_s", cells[when])
         named = rows.setdefault(Path(cells[which]).name, {})
         if named.setdefault(Path(cells[which]).as_posix(), when_s) != when_s:
             raise InvalidInputError(f"{table.where(line)}: {column} {cells[which]!r} again, expected one time of each")
@@ -189,13 +186,11 @@ def _table_times(path: Path, column: str, files: Sequence[Path]) -> NDArray[np.f
     for file, one in zip(files, found, strict=True):
         if len(one) > 1:
             raise InvalidInputError(f"{path}: {len(one)} times of {file}, expected one, by its path")
-    times = [one.pop() if one else np.nan for one in found]
-    missing = [str(file) for file, time_s in zip(files, times, strict=True) if not np.isfinite(time_s)]
-    if missing:
+    if missing := [str(file) for file, one in zip(files, found, strict=True) if not one]:
         raise InvalidInputError(
             f"{path}: no time of {missing[0]} ({len(missing)} missing), expected one for each image"
         )
-    return np.array(times)
+    return np.array([one.pop() for one in found])
 
 
 def _times_of_names(files: Sequence[Path]) -> NDArray[np.float64] | None:

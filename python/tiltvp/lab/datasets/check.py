@@ -8,11 +8,12 @@ from pathlib import Path
 
 from tiltvp.errors import TiltvpError
 from tiltvp.lab.datasets.description import CALIBRATION
+from tiltvp.lab.datasets.driven import read_drive
 from tiltvp.lab.datasets.findings import Finding, Findings
 from tiltvp.lab.datasets.folder import find_dataset
 from tiltvp.lab.datasets.rows import ROWS
 from tiltvp.stereo_rigs import StereoRig
-from tiltvp.streams import open_frames
+from tiltvp.streams import frame_motions, open_frames
 
 __all__ = ["Finding", "check_dataset", "is_stereo"]
 
@@ -20,7 +21,7 @@ __all__ = ["Finding", "check_dataset", "is_stereo"]
 def check_dataset(directory: str | os.PathLike[str], advance: Callable[[], None] = lambda: None) -> list[Finding]:
     """All that is wrong with a dataset: its description, calibration, table, and every image.
 
-    Of a stereo sequence (`is_stereo`) that is calibration, times, and the pairs of images.
+    Of a drive also its tables; of a stereo sequence (`is_stereo`) that is calibration, times, and the pairs of images.
 
     Warnings are of what hinders some uses only: fewer than two locations cannot be cross-validated, and without a lean
     there is no factor to train. `advance` is called after each image.
@@ -40,6 +41,8 @@ def check_dataset(directory: str | os.PathLike[str], advance: Callable[[], None]
             what, _, expected = str(error).removeprefix(f"{image.path}: ").partition(", expected ")
             findings.add(image.path, None, what, expected or "an image")
         advance()
+    if dataset.source.get("kind") == "drive":
+        _check_drive(folder, findings)
     if dataset.images:
         table = folder / ROWS
         locations = {image.location for image in dataset.images}
@@ -55,6 +58,15 @@ def check_dataset(directory: str | os.PathLike[str], advance: Callable[[], None]
 def is_stereo(folder: Path) -> bool:
     """Whether a folder has a stereo sequence, of `tiltvp dataset stereo`, and no images of known lean."""
     return (folder / CALIBRATION).is_file() and not (folder / ROWS).exists()
+
+
+def _check_drive(folder: Path, findings: Findings) -> None:
+    for read in (read_drive, lambda drive: frame_motions(open_frames(drive), drive / "odometry.csv")):
+        try:
+            read(folder)
+        except TiltvpError as error:
+            what, _, expected = str(error).removeprefix(f"{folder}: ").partition(", expected ")
+            findings.add(folder, None, what, expected or "a drive")
 
 
 def _check_stereo(folder: Path, findings: Findings) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,9 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltvp.csv_files import LARGEST_CSV_BYTES
+from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
-from tiltvp.files import read_text
 from tiltvp.lab.datasets.driving import POSES, TRUTH
 from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.synth import DriveTruth
@@ -81,19 +78,9 @@ def _truth(rows: NDArray[np.float64]) -> DriveTruth:
 
 def _columns(path: Path, header: Sequence[str], wanted: Sequence[str]) -> NDArray[np.float64]:
     """(rows, wanted): columns of numbers of a table that has just this header."""
-    try:
-        lines = csv.reader(io.StringIO(read_text(path, LARGEST_CSV_BYTES), newline=""))
-    except OSError as error:
-        problem = error.strerror or error
-        raise InvalidInputError(f"{path}: {problem}, expected a file of a drive (tiltvp dataset drive)") from error
-    except UnicodeDecodeError as error:
-        raise InvalidInputError(f"{path}: not UTF-8, expected a file of a drive (tiltvp dataset drive)") from error
-    try:
-        found = next(lines, [])
-        if tuple(found) != tuple(header):
-            raise InvalidInputError(f"{path}, line 1: expected the columns {', '.join(header)}")
-        places = [found.index(name) for name in wanted]
-        rows = [[float(row[place]) for place in places] for row in lines if row]
-    except (ValueError, IndexError, csv.Error) as error:
-        raise InvalidInputError(f"{path}, line {lines.line_num}: {error}, expected {len(header)} cells") from error
+    table = CsvFile(path, "a file of a drive (tiltvp dataset drive)")
+    if table.header != list(header):
+        raise InvalidInputError(f"{table.where(1)}: other columns, expected {', '.join(header)}")
+    places = {name: table.header.index(name) for name in wanted}
+    rows = [[table.number(line, name, cells[place]) for name, place in places.items()] for line, cells in table.rows()]
     return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted))
