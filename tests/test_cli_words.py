@@ -56,7 +56,10 @@ def test_a_dash_of_no_command_is_wrong_use(words: tuple[str, ...], run: Run) -> 
 
 
 def test_what_is_not_given_is_said_to_be_that(run: Run) -> None:
-    assert run("tilt", "images").err == 'tiltvp: Command "tilt" parameter --camera is not given. Try `tiltvp --help`.\n'
+    assert (
+        run("tilt", "images").err
+        == 'tiltvp: Command "tilt" parameter --camera is not given. Try `tiltvp tilt --help`.\n'
+    )
     assert "--camera requires an argument." in run("tilt", "images", "--camera").err
 
 
@@ -236,3 +239,19 @@ def test_closed_streams_of_a_service_are_no_fault(world: Path, closed: str) -> N
     assert tiltvp.Camera.load(out).width == 128
     # And of what is wrong nothing can be said, but by the code.
     assert subprocess.run([sys.executable, "-c", start, "-c", script, *words], capture_output=True).returncode == 2
+
+
+def test_images_that_are_none_of_the_camera_s_are_told_by_what_is_wrong_with_the_first(
+    run: Run, camera: tiltvp.Camera, tmp_path: Path
+) -> None:
+    camera.save(tmp_path / "camera.toml")
+    for k in range(6):
+        tiltvp.write_image(
+            tmp_path / "images" / f"{k}.png", np.zeros((camera.height // 2, camera.width // 2), np.uint8)
+        )
+    got = f"0.png: got {camera.height // 2} x {camera.width // 2} pixels, expected {camera.height} x {camera.width}"
+    for words in (("mount",), ("setup", "--out", tmp_path / "robot.toml")):
+        said = run(*words, tmp_path / "images", "--camera", tmp_path / "camera.toml")
+        assert said.code == 2
+        assert got in said.complaint
+        assert "`tiltvp camera scale FILE OUT --to" in said.complaint

@@ -30,7 +30,7 @@ from tiltvp.errors import (
     OutputError,
     TiltvpError,
 )
-from tiltvp.files import keeping_existing, whole_file, write_whole
+from tiltvp.files import check_output, check_output_folder, keeping_existing, whole_file, write_whole
 from tiltvp.formats import document, write_cameras
 from tiltvp.lab.datasets.folder import read_dataset
 from tiltvp.rotations import read_rotation
@@ -239,6 +239,17 @@ def test_outputs_are_kept_where_that_is_asked_and_parts_of_the_dead_are_swept(tm
     assert [path.name for path in tmp_path.iterdir()] == ["out.txt"]
     with pytest.raises(OutputError, match="no regular file"):
         write_whole("/dev/null", "lost")
+
+
+def test_folders_that_may_not_be_written_to_are_refused_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda place, _: place != str(tmp_path))
+    for check in (check_output, check_output_folder):
+        with pytest.raises(OutputError, match=f"its folder {tmp_path} may not be written to"):
+            check(tmp_path / "new" / "out.csv")
+        (tmp_path / "open").mkdir(exist_ok=True)
+        check(tmp_path / "open" / "new" / "out.csv")
 
 
 @pytest.mark.parametrize("value", [10**400, 10**5000, "1", [1.0], object()], ids=type)

@@ -327,6 +327,9 @@ def test_what_is_not_there_is_told(tmp_path: Path) -> None:
         open_frames(tmp_path / "empty")
     with pytest.raises(InvalidInputError, match="expected one video or recording"):
         open_frames([tmp_path / "a.png", tmp_path / "b.mp4"])
+    with pytest.raises(InvalidInputError, match="nowhere: no such file or folder, expected images, a video"):
+        open_frames(tmp_path / "nowhere")
+    assert len(open_frames([tmp_path / "a.png", tmp_path / "nowhere"]).problems) == 1
     with pytest.raises(InvalidInputError, match="zero byte"):
         open_frames("a\0b")
     with pytest.raises(InvalidInputError, match="letters that a file's name can have"):

@@ -79,11 +79,13 @@ def keeps_existing() -> bool:
 
 
 def check_output(path: str | os.PathLike[str]) -> None:
-    """Refuses what no file can be written to, before any work is done: what is no regular file, and what is to be kept.
+    """Refuses what no file can be written to, before any work is done: what is no regular file, what is to be kept, and
+    what is in a folder that may not be written to.
 
     Raises `OutputError` or `InvalidInputError`.
     """
     file = path_from(path)
+    _check_writable(file)
     try:
         state = os.stat(file)
     except FileNotFoundError:
@@ -113,12 +115,29 @@ def check_replacing(what: str) -> None:
 
 
 def check_output_folder(path: str | os.PathLike[str]) -> None:
-    """Refuses a file, and a folder that is to be kept: one that holds anything. Raises `InvalidInputError`."""
+    """Refuses a file, a folder that is to be kept: one that holds anything, and one that may not be written to.
+
+    Raises `InvalidInputError` or `OutputError`.
+    """
     folder = path_from(path)
+    _check_writable(folder)
     if folder.exists() and not folder.is_dir():
         raise InvalidInputError(f"{folder}: is a file, expected a folder")
     if keeps_existing() and folder.is_dir() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder}: exists, expected a new or empty folder, or --overwrite to replace it")
+
+
+def _check_writable(path: Path) -> None:
+    """Refuses an output where the nearest folder that is there may not be written to."""
+    try:
+        folder = os.path.realpath(path)
+    except (OSError, ValueError):
+        return  # What is wrong with the name is told where it is written.
+    while not os.path.isdir(folder):
+        folder = os.path.dirname(folder)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        why = f"its folder {folder} may not be written to"
+        raise OutputError(f"{path}: cannot be written ({why}), expected a place that can")
 
 
 def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:

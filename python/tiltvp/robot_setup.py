@@ -149,7 +149,8 @@ def find_setup(
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
         words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
-        raise InvalidInputError(f"{frames.source}: {words} of {camera.width} x {camera.height} pixels")
+        words = f"{words} of {camera.width} x {camera.height} pixels"
+        raise InvalidInputError(f"{frames.source}: {words}{_first_problem(frames, camera)}")
     rim, body = None, BodyMask(None, 0, "a mask was given")
     if mask is None:
         inside, body = rim_and_body(frames, camera)
@@ -218,17 +219,22 @@ def drive_tilts(
     degrees, or was taken where the odometry does not tell, is None.
 
     Without odometry (`motions` is None) the robot is taken not to have moved, so that nothing can tell floor and
-    mounting apart.
+    mounting apart. Raises `InvalidInputError` where no image can be read and has the camera's size.
     """
     count = _count_of(frames, motions)
     numbers = [int(number) for number in np.linspace(0, count - 1, measured_count(frames))]
     estimates: list[TiltEstimate | None] = []
+    usable = 0
     for number, frame in zip(numbers, frames.sample(numbers), strict=False):
         told = motions is None or motions[number] is not None
         image = _usable(frame, estimator.camera) if told else None
+        usable += image is not None or not told
         estimate = None if image is None else estimator(image)
         estimates.append(estimate if estimate else None)
         advance()
+    if not usable:
+        problem = _first_problem(frames, estimator.camera)
+        raise InvalidInputError(f"{frames.source}: none of {counted(len(numbers), 'images')} can be used{problem}")
     return DriveTilts(estimates, _joined(motions, numbers))
 
 
@@ -282,10 +288,24 @@ def spread(frames: Frames, camera: _core.Camera, parts: int) -> Iterator[tuple[i
 
 
 def _usable(frame: Frame, camera: _core.Camera) -> Image | None:
+    image = _image_of(frame, camera)
+    return None if isinstance(image, TiltvpError) else image
+
+
+def _image_of(frame: Frame, camera: _core.Camera) -> Image | TiltvpError:
     image = frame.image
-    if isinstance(image, TiltvpError) or image.shape[:2] != (camera.height, camera.width):
-        return None
-    return image
+    if isinstance(image, TiltvpError) or image.shape[:2] == (camera.height, camera.width):
+        return image
+    # As the core says it of an image that is given to an estimator.
+    got = f"got {image.shape[0]} x {image.shape[1]} pixels"
+    expected = f"expected {camera.height} x {camera.width} (rows x columns), as the camera's images"
+    return InvalidInputError(f"{frame.name}: {got}, {expected}")
+
+
+def _first_problem(frames: Frames, camera: _core.Camera) -> str:
+    """What is wrong with the first frame that cannot be used, to be put behind a sentence; empty where none is."""
+    images = (_image_of(frame, camera) for frame in frames.sample(range(min(frames.count or 0, LEAST))))
+    return next((f": {image}" for image in images if isinstance(image, TiltvpError)), "")
 
 
 def _joined(motions: Sequence[Motion | None] | None, numbers: Sequence[int]) -> list[Motion | None]:

@@ -72,7 +72,7 @@ def run_words(arguments: Sequence[str] | None) -> int:
         said = str(error)
         if isinstance(error, MissingArgumentError) and error.keyword is None:
             said = said.replace(" requires an argument.", " is not given.")
-        complain(f"{said} Try `tiltvp --help`.")
+        complain(f"{said} Try `{' '.join(('tiltvp', *(error.command_chain or ()), '--help'))}`.")
         return WRONG_USE
     except (MissingExtraError, OutputError) as error:
         complain(str(error))

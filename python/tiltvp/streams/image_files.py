@@ -110,8 +110,11 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str], list[tuple
             if not found:
                 inner = ", nor in a folder images or frames in it"
                 problems.append(f"{word}: a folder without images, expected files in {' '.join(IMAGE_ENDINGS)}{inner}")
-        elif os.path.exists(path) or not glob.has_magic(word):
+        elif os.path.exists(path) or (not glob.has_magic(word) and path.suffix.lower() in IMAGE_ENDINGS):
             found = [path]
+        elif not glob.has_magic(word):
+            found = []
+            problems.append(f"{word}: no such file or folder, expected images, a video or a recording")
         else:
             found = [Path(match) for match in glob.glob(word, recursive=True) if not os.path.isdir(match)]
             found.sort(key=_by_name)
