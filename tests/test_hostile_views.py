@@ -13,10 +13,11 @@ import tiltvp
 from tiltvp import METHODS, TiltEstimator
 from tiltvp.cli import main
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
-from tiltvp.lab.datasets.hostile import CASES, UNHARMED, hostile_images
+from tiltvp.lab.datasets.hostile import AHEAD, CASES, FORWARD, UNHARMED, hostile_images
 from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
 from tiltvp.lab.evaluation.hostile import SURE, judge_images, summarise_cases
 from tiltvp.rotations import read_rotation
+from tiltvp.synth import render_room
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +101,15 @@ def test_what_is_drawn_of_whole_pixels_alone_is_not_believed() -> None:
     assert estimate
     assert estimate.confidence <= 0.5
     assert "100 % of the edge pixels that agree are steps of the pixel grid" in estimate.reason
+
+
+def test_a_room_drawn_without_noise_keeps_its_answer() -> None:
+    """All its verticals are steps of the pixel grid, and what is left tells another vertical, and is not sure."""
+    image = render_room(AHEAD, kind="office", seed=1, robot_from_camera=FORWARD, samples=3, noise_sigma=0.0).gray
+    estimate = TiltEstimator(AHEAD, method="segments", robot_from_camera=FORWARD)(image)
+    assert estimate.alpha_rad < np.radians(0.1)
+    assert estimate.confidence <= 0.5
+    assert "steps of the pixel grid" in estimate.reason
 
 
 def test_the_table_counts_who_was_wrong_and_sure() -> None:

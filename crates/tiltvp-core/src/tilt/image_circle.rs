@@ -181,7 +181,7 @@ impl ImageCircle {
 }
 
 /// A calibration's centre that is off, as the image circle tells.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct CentreOff<'a> {
     pub circle: &'a ImageCircle,
     pub robot_from_camera: &'a Matrix3<f64>,

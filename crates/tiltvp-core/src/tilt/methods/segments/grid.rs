@@ -9,7 +9,6 @@ use crate::image::ImageView;
 use crate::segments::{EdgePoint, Segment, Segments};
 use crate::tilt::doubt::Doubt;
 use crate::tilt::estimate::TiltEstimate;
-use crate::tilt::fit::Fit;
 
 /// Share of the pixels that agree from which on the others are asked: of views that are not harmed one in a hundred has as much.
 const SHARE_MIN: f64 = 0.25;
@@ -27,7 +26,10 @@ const APART_SIGMAS: f64 = 3.0;
 /// Share of what agrees from which on it is most of it.
 const MOST: f64 = 0.5;
 
-/// Share of the confidence that is left where no other edges tell the vertical: a view that is drawn without blur may be right.
+/// Share of the confidence of all edges that the others need to be believed instead.
+const AS_SURE: f64 = 0.5;
+
+/// Share of the confidence that is left where no other edges tell the same vertical: a view that is drawn without blur may be right.
 const ALONE: f64 = 0.5;
 
 /// So much of what agrees is steps of the pixel grid.
@@ -50,13 +52,21 @@ impl OnGrid {
         (share >= SHARE_MIN).then_some(Self { share })
     }
 
-    /// Doubts an estimate for which no other edges speak. Where they are a part of the edges alone, the rest may agree and not be sure.
-    pub(super) fn doubt(self, estimate: &mut TiltEstimate) {
-        if self.share >= MOST {
-            estimate.confidence *= ALONE;
-            estimate.doubt = estimate.doubt.or(Some(Doubt::OnGrid { share: self.share }));
+    /// Doubts an estimate that the other edges contradict, or of which most is steps and the others tell nothing. Where steps are a part
+    /// of the edges alone, the rest may agree and not be sure.
+    pub(super) fn doubt(self, told: &mut TiltEstimate, others: &TiltEstimate) {
+        let tells = others.tilt.is_some() && others.covariance_rad2[(0, 0)].is_finite();
+        if contradicts(others, told) || !tells && self.share >= MOST {
+            told.confidence *= ALONE;
+            told.doubt = told.doubt.or(Some(Doubt::OnGrid { share: self.share }));
         }
     }
+}
+
+/// Whether the other edges tell another vertical, and about as surely: of what is drawn without blur or noise by an upright camera
+/// they are what is left.
+pub(super) fn outdone(told: &TiltEstimate, others: &TiltEstimate) -> bool {
+    others.confidence >= AS_SURE * told.confidence && contradicts(others, told)
 }
 
 /// Some points of a segment.
@@ -97,13 +107,11 @@ pub(super) fn leave_out(image: &ImageView<'_>, work: &mut SegmentWork) {
     }
 }
 
-/// Whether the fit to the others is another one than that to all, by more than it may err.
-pub(super) fn contradicts(others: &Fit, all: &Fit) -> bool {
-    let (Some(others_tilt), Some(covariance), Some(tilt)) = (others.tilt, others.covariance, all.tilt) else {
-        return false;
-    };
+/// Whether the others tell another vertical, by more than they may err.
+fn contradicts(others: &TiltEstimate, told: &TiltEstimate) -> bool {
+    let (Some(others_tilt), Some(tilt)) = (others.tilt, told.tilt) else { return false };
     let away = tangent_basis(&others_tilt.normal()).transpose() * tilt.normal();
     let apart = others_tilt.normal().angle(&tilt.normal());
-    let squares = covariance.try_inverse().map_or(0.0, |inverse| away.dot(&(inverse * away)));
+    let squares = others.covariance_rad2.try_inverse().map_or(0.0, |inverse| away.dot(&(inverse * away)));
     apart > APART_RAD && (apart > FRAC_PI_2 || squares > APART_SIGMAS * APART_SIGMAS)
 }

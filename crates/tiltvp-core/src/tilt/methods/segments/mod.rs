@@ -45,6 +45,7 @@ use crate::tilt::lightness::LIGHTS;
 use crate::tilt::scratch::Scratch;
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trust::{ASPECT, Logit, Seen, Trust};
+use crate::tilt::work::Work;
 
 /// The largest lean up to which edges near the vertical are looked at alone. Beyond it those of horizontal things may be as near,
 /// and frames of three directions are weighed.
@@ -161,35 +162,18 @@ impl ImageFitter for SegmentFit {
         let gradients = self.finder.gradients(self.edges.gradient_min);
         self.finder.find(image, region, gradients, None, &mut work.finder, &mut work.segments);
         self.weigh_edges(work);
-        let (fit, on_grid) = self.fit_off_grid(image, work);
-        let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
-            fit
-        } else {
-            let SegmentWork { finder, strong, .. } = &mut **work;
-            let vote = self.vote.as_ref().map(|vote| vote.of(&finder.ridge, tables, strong, pixel_work));
-            vote.map_or(fit, |vote| fused(&fit, &vote, region.pixels_per_rad()))
-        };
-        let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
-        let trust = (self.tilt_max_rad <= NEAR_MAX_RAD).then_some(&TRUST);
-        let lights = trust.map_or([0.0; LIGHTS], |_| tables.lightness.of(image));
-        let up = fit.tilt.filter(|_| trust.is_some()).map(|tilt| tilt.normal());
-        let seen = Seen {
-            lights: &lights,
-            aspect: up.map_or([0.0; ASPECT], |up| self.aspect.of(&work.edges, &up, &mut work.columns)),
-            edge_pixels: work.segments.points.len(),
-            pixels: region.len(),
-            prefiltered_pixels: considered,
-            pixels_per_rad: region.pixels_per_rad(),
-            tilt_max_rad: self.tilt_max_rad,
-            expected_max_rad: self.expected_max_rad,
-            trust,
-            centre_off,
-        };
-        let mut estimate = fit.into_estimate(&seen, &mut pixel_work.trusted);
-        if let Some(on_grid) = on_grid {
-            on_grid.doubt(&mut estimate);
+        let mut told = self.fitted(image, tables, centre_off, work, pixel_work);
+        let Some(on_grid) = OnGrid::of(image, work).filter(|_| told.tilt.is_some()) else { return told };
+        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
+        grid::leave_out(image, work);
+        let others = self.fitted(image, tables, centre_off, work, pixel_work);
+        self.weigh_edges(work);
+        if grid::outdone(&told, &others) {
+            return others;
         }
-        estimate
+        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
+        on_grid.doubt(&mut told, &others);
+        told
     }
 
     fn elements(&self, centre: (f32, f32), scratch: &Scratch) -> Vec<EdgeElement> {
@@ -230,25 +214,41 @@ impl SegmentFit {
         edges.extend(longest.map(|segment| Edge::new(&self.robot_from_camera, segment)));
     }
 
-    fn fit_straight(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> Fit {
-        if self.tilt_max_rad > NEAR_MAX_RAD { self.fit_anywhere(image, work) } else { self.fit_near(work) }
-    }
-
-    /// The fit to all edges, or where steps of the pixel grid are much of what agrees and the others tell another vertical, to the
-    /// others; and a doubt where these tell none.
-    fn fit_off_grid(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> (Fit, Option<OnGrid>) {
-        let fit = self.fit_straight(image, work);
-        let Some(on_grid) = OnGrid::of(image, work).filter(|_| fit.tilt.is_some()) else { return (fit, None) };
-        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
-        grid::leave_out(image, work);
-        let others = self.fit_straight(image, work);
-        self.weigh_edges(work);
-        if grid::contradicts(&others, &fit) {
-            return (others, None);
-        }
-        std::mem::swap(&mut work.weighed, &mut work.weighed_with_grid);
-        let tells = others.tilt.is_some() && others.covariance.is_some();
-        (fit, (!tells).then_some(on_grid))
+    /// The estimate of the edges that have weight.
+    fn fitted(
+        &self,
+        image: &ImageView<'_>,
+        tables: &PixelTables,
+        centre_off: Option<CentreOff<'_>>,
+        work: &mut SegmentWork,
+        pixel_work: &mut Work,
+    ) -> TiltEstimate {
+        let region = &tables.region;
+        let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
+            self.fit_anywhere(image, work)
+        } else {
+            let fit = self.fit_near(work);
+            let SegmentWork { finder, strong, .. } = work;
+            let vote = self.vote.as_ref().map(|vote| vote.of(&finder.ridge, tables, strong, pixel_work));
+            vote.map_or(fit, |vote| fused(&fit, &vote, region.pixels_per_rad()))
+        };
+        let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
+        let trust = (self.tilt_max_rad <= NEAR_MAX_RAD).then_some(&TRUST);
+        let lights = trust.map_or([0.0; LIGHTS], |_| tables.lightness.of(image));
+        let up = fit.tilt.filter(|_| trust.is_some()).map(|tilt| tilt.normal());
+        let seen = Seen {
+            lights: &lights,
+            aspect: up.map_or([0.0; ASPECT], |up| self.aspect.of(&work.edges, &up, &mut work.columns)),
+            edge_pixels: work.segments.points.len(),
+            pixels: region.len(),
+            prefiltered_pixels: considered,
+            pixels_per_rad: region.pixels_per_rad(),
+            tilt_max_rad: self.tilt_max_rad,
+            expected_max_rad: self.expected_max_rad,
+            trust,
+            centre_off,
+        };
+        fit.into_estimate(&seen, &mut pixel_work.trusted)
     }
 
     /// The most likely of the frames about the leans that most edges near the upright agree with.
