@@ -14,14 +14,12 @@ import numpy as np
 import polars as pl
 import pytest
 from cyclopts import CoercionError, Token
-from rich.console import Console
 
 import tiltvp
 from commands import Run, verbs
 from recordings import START_S, Bag
 from tiltvp import _core
 from tiltvp.cli.app import app
-from tiltvp.cli.terminal import lines_of, new_table
 from tiltvp.streams import Wheels
 from tiltvp.synth import RoomImage
 
@@ -257,27 +255,3 @@ def test_images_that_are_none_of_the_camera_s_are_told_by_what_is_wrong_with_the
         assert said.code == 2
         assert got in said.complaint
         assert "`tiltvp camera scale FILE OUT --to" in said.complaint
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [],
-        [("a.png", "1.25", "")],
-        [("a.png", "1.25", "converged"), ("ordner/äöü.png", "-", "no tilt: [red]too few[/red] :smile:")],
-        [("画像/一.png", "100.00", "x" * 150), ("b", "", "")],
-    ],
-)
-def test_tables_of_files_are_as_rich_prints_them(rows: list[tuple[str, str, str]]) -> None:
-    table = new_table(None, ("file", "roll deg", "reason"), left=("file", "reason"))
-    for row in rows:
-        table.add_row(*row)
-    console = Console(highlight=False, markup=False, emoji=False, width=240, file=io.StringIO())
-    with console.capture() as capture:
-        console.print(table)
-    lines = lines_of(table, 240)
-    assert [line.rstrip() for line in lines] == [line.rstrip() for line in capture.get().splitlines() if line.strip()]
-    assert lines_of(table, len(lines[1])) is None
-    for other in (("a\nb", "", ""), ("a ", "", ""), ("a\tb", "", "")):
-        table.add_row(*other)
-        assert lines_of(table, 240) is None

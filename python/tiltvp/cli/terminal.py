@@ -76,39 +76,11 @@ def _show(*tables: Table) -> None:
     if console.is_terminal:
         console.print(*tables)
         return
-    for table in tables:
-        lines = lines_of(table, console.width)
-        if lines is None:
-            with console.capture() as capture:
-                console.print(table)
-            lines = capture.get().splitlines()
-        for line in filter(str.strip, lines):
+    with console.capture() as capture:
+        console.print(*tables)
+    for line in capture.get().splitlines():
+        if line.strip():
             print(line.rstrip())
-
-
-def lines_of(table: Table, most: int) -> list[str] | None:
-    """A table of `new_table` as rich prints it, which takes it a millisecond a row; None of one that has a title, has
-    other than plain words, or is wider than `most`."""
-    from rich.cells import cell_len
-
-    columns = [[column.header, *column.cells] for column in table.columns]
-    plain = all(isinstance(one, str) and one.isprintable() and one == one.strip() for cells in columns for one in cells)
-    if table.title is not None or not plain:
-        return None
-    sizes = [[cell_len(str(one)) for one in cells] for cells in columns]
-    widths = [max(lengths) for lengths in sizes]
-    inner = sum(widths) + 3 * (len(widths) - 1)
-    if inner + 2 > most:
-        return None
-    filled = [
-        [
-            " " * (w - n) + str(one) if column.justify == "right" else str(one) + " " * (w - n)
-            for one, n in zip(*pair, strict=True)
-        ]
-        for column, w, *pair in zip(table.columns, widths, columns, sizes, strict=True)
-    ]
-    head, *rows = (f" {'   '.join(row)}" for row in zip(*filled, strict=True))
-    return [head, f" {'─' * inner}", *rows]
 
 
 def width() -> int:
