@@ -152,7 +152,10 @@ def _late(by_lines: Table, told: Table) -> int:
 
 
 def _factor(by_lines: Table, told: Table) -> float:
-    """How many times as far as told (N,) lines turn (N,); 1 where it is about that, or not half of them agree."""
+    """How many times as far as told (N,) lines turn (N,); 1 where it is about that, they turn little, or not half of
+    them agree."""
+    if np.abs(by_lines).sum() < _TURNED_RAD:
+        return 1.0
     factor = _weighted_median(by_lines, told)
     agree = np.abs(by_lines - factor * told) < _OTHER_FACTOR * np.abs(factor * told)
     is_other = abs(factor - 1.0) > _OTHER_FACTOR and 2.0 * np.abs(told[agree]).sum() > np.abs(told).sum()

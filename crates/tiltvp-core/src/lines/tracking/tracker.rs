@@ -198,7 +198,7 @@ impl LineTracker {
         pairs.iter().flatten().count()
     }
 
-    /// Where fewer than half of the lines go on, and twice as many and more than half would by another turn, pairs them by that.
+    /// Where fewer than half of the lines go on, and twice as many and at least half would by another turn, pairs them by that.
     /// Returns by how much that is farther to the left; 0 elsewhere.
     fn jump(&mut self, lines: &[Line], descriptors: &[f32], width: usize) -> f64 {
         let Self { options, state, pairs, jumps, .. } = self;
