@@ -25,6 +25,12 @@ fn images() -> Vec<Image> {
     let lean = |i: u32| Tilt::from_alpha_beta(0.03 * f64::from(i), f64::from(i));
     let mut images = vec![constant(&camera, 90.0), noise(&camera, 1), noise(&camera, 2)];
     images.extend((0..5).map(|i| stripes(&camera, &Matrix3::identity(), &lean(i), 23, 3.0, u64::from(i))));
+    // Lines of one pixel, as they are drawn into images.
+    let mut drawn = stripes(&camera, &Matrix3::identity(), &lean(1), 5, 3.0, 9);
+    for (i, level) in drawn.data.iter_mut().enumerate().filter(|(i, _)| i % 7 == 0) {
+        *level = if (i / drawn.width) % 80 < 40 { 255 } else { *level };
+    }
+    images.push(drawn);
     images
 }
 
@@ -195,6 +201,8 @@ fn wrong_edges_are_refused() {
     assert!(estimator.estimate_edges(&beyond, &mut estimator.scratch()).unwrap_err().to_string().contains("below"));
     let none = make(&[], &[]).unwrap();
     assert!(none.is_empty() && estimator.estimate_edges(&none, &mut estimator.scratch()).unwrap().tilt.is_none());
+    assert!(none.clone().with_steps(&[5, 5]).unwrap_err().to_string().contains("ascending"));
+    assert_eq!(none.clone().with_steps(&[2, 5]).unwrap().steps(), [2, 5]);
     let off = Vector2::new(3.0, -2.0);
     assert_eq!(none.clone().with_centre_off_px(Some(off)).unwrap().centre_off_px(), Some(off));
     assert!(none.with_centre_off_px(Some(off * f64::NAN)).unwrap_err().to_string().contains("centre"));

@@ -11,7 +11,7 @@ mod ridge;
 
 pub use detect::{Detector, EdgePixels};
 pub(crate) use extent::Extent;
-pub(crate) use grid_step::is_grid_step;
+pub(crate) use grid_step::{StepMap, is_grid_step};
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
 pub use prefilter::Prefilter;

@@ -38,7 +38,7 @@ pub struct Region {
 const TABLE_BYTES: usize = 21;
 
 /// Bytes a pixel that the memory of one thread takes at most, where every pixel is an edge pixel.
-const SCRATCH_BYTES: usize = 48;
+const SCRATCH_BYTES: usize = 49;
 
 /// Pixels after which a walk over all asks whether it is to end: a millisecond where a pixel takes 0.2 us.
 const CHECKED_PIXELS: usize = 4096;
@@ -192,6 +192,11 @@ impl Region {
     /// The spans, row by row.
     pub fn spans(&self) -> &[Span] {
         &self.spans
+    }
+
+    /// Columns and rows of the images.
+    pub(crate) fn image_size(&self) -> [usize; 2] {
+        [self.camera.width() as usize, self.camera.height() as usize]
     }
 
     /// How many pixels there are.

@@ -57,6 +57,16 @@ impl<T: Real> Rows<T> {
         self.len = write(self.columns.each_mut().map(Aligned::as_mut_slice)).min(capacity);
     }
 
+    /// Writes one row over another.
+    pub fn put(&mut self, row: usize, over: usize) {
+        self.columns.iter_mut().for_each(|column| column.as_mut_slice().copy_within(row..=row, over));
+    }
+
+    /// Keeps the first so many rows.
+    pub fn truncate(&mut self, len: usize) {
+        self.len = self.len.min(len);
+    }
+
     /// How many rows there are.
     pub fn len(&self) -> usize {
         self.len

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
+use super::fit::Fit;
 use super::image_circle::CentreOff;
 use super::image_edges::{EdgeOrigin, ImageEdges};
 use super::lightness::LIGHTS;
 use super::methods::{Fitter, Prepared, Setting, edge_offset};
+use super::on_grid::{self, Steps};
 use super::options::TiltOptions;
 use super::scratch::Scratch;
 use super::tables::PixelTables;
@@ -33,6 +35,13 @@ pub struct TiltEstimator {
     pub(super) options: TiltOptions,
     pub(super) pixels: Arc<PixelTables>,
     method: Prepared,
+}
+
+/// What the estimate of edge pixels is told of their image beside them.
+struct Told<'a> {
+    off_px: Option<Vector2<f64>>,
+    lights: &'a [f64; LIGHTS],
+    steps: Steps<'a>,
 }
 
 impl TiltEstimator {
@@ -163,7 +172,8 @@ impl TiltEstimator {
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
                 let of_up = method.trust().and_then(|trust| trust.up.as_ref());
                 let lights = of_up.map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
-                Ok(self.fit(&**method, edges, (off_px, &lights), work))
+                let told = Told { off_px, lights: &lights, steps: Steps::Of(image) };
+                Ok(self.fit(&**method, edges, &told, work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
         }
@@ -182,6 +192,7 @@ impl TiltEstimator {
         detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, edges);
         ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())?
             .with_centre_off_px(self.centre_off_px(image))?
+            .with_steps(&Steps::Of(image).all(edges, &self.pixels.region))?
             .with_lights(&self.pixels.lightness.of(image))
     }
 
@@ -206,7 +217,12 @@ impl TiltEstimator {
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
         image_edges.copy_to(&self.origin, &self.pixels.region, edges)?;
-        Ok(self.fit(method, edges, (image_edges.centre_off_px(), image_edges.lights()), work))
+        let told = Told {
+            off_px: image_edges.centre_off_px(),
+            lights: image_edges.lights(),
+            steps: Steps::Known(image_edges.steps()),
+        };
+        Ok(self.fit(method, edges, &told, work))
     }
 
     /// The method, if it looks at edge pixels.
@@ -222,27 +238,49 @@ impl TiltEstimator {
 
     /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
-    fn fit(
+    fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, told: &Told<'_>, work: &mut Work) -> TiltEstimate {
+        let pixels = &*self.pixels;
+        let fit = method.fit(edges, pixels, work);
+        let estimate = self.conclude(method, edges, told, &fit, work);
+        let Some(refitter) = method.refitter().filter(|_| estimate.tilt.is_some()) else { return estimate };
+        let Some(share) = told.steps.share(edges, &pixels.region, work) else { return estimate };
+        told.steps.leave_out(edges, &pixels.region, work);
+        let others = refitter.refit(pixels, work);
+        let others = self.conclude(method, edges, told, &others, work);
+        let is_as_sure = on_grid::is_as_sure(&others, &estimate);
+        if is_as_sure && on_grid::is_apart(&others, &estimate) {
+            return others;
+        }
+        // Again: what is asked of single pixels is answered from the last fit.
+        let fit = method.fit(edges, pixels, work);
+        let mut estimate = self.conclude(method, edges, told, &fit, work);
+        if !is_as_sure {
+            on_grid::doubt(&mut estimate, share);
+        }
+        estimate
+    }
+
+    /// The estimate of a fit, by what else is known of the image.
+    fn conclude(
         &self,
         method: &dyn Fitter,
         edges: &EdgePixels,
-        (off_px, lights): (Option<Vector2<f64>>, &[f64; LIGHTS]),
+        told: &Told<'_>,
+        fit: &Fit,
         work: &mut Work,
     ) -> TiltEstimate {
-        let fit = method.fit(edges, &self.pixels, work);
         let [own_max_rad, tilt_max_rad] = method.lean_limits_rad();
-        let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let seen = Seen {
-            edge_pixels,
+            edge_pixels: edges.strong(),
             pixels: self.pixels.region.len(),
-            prefiltered_pixels,
+            prefiltered_pixels: work.rows.len(),
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad,
             expected_max_rad: self.options.tilt_max_rad.unwrap_or(own_max_rad),
-            lights,
+            lights: told.lights,
             aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),
-            centre_off: self.centre_off(off_px),
+            centre_off: self.centre_off(told.off_px),
         };
         fit.into_estimate(&seen, &mut work.trusted)
     }

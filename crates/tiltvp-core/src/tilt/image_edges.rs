@@ -63,6 +63,7 @@ pub struct ImageEdges {
     gy: Arc<[f32]>,
     centre_off_px: Option<Vector2<f64>>,
     lights: [f64; LIGHTS],
+    steps: Arc<[u32]>,
 }
 
 impl ImageEdges {
@@ -75,9 +76,7 @@ impl ImageEdges {
             let got = format!("{} pixels, {} and {} gradients", slots.len(), gx.len(), gy.len());
             return Err(Error::argument("edges", got, "as many gradients as pixels"));
         }
-        if !slots.is_sorted_by(|a, b| a < b) {
-            return Err(Error::argument("edges", "pixels out of order", "each pixel once, in ascending order"));
-        }
+        check_ascending(slots)?;
         if !gx.iter().chain(gy).all(|g| g.is_finite()) {
             return Err(Error::argument("edges", "gradients that are not finite", "finite gradients"));
         }
@@ -88,6 +87,7 @@ impl ImageEdges {
             gy: gy.into(),
             centre_off_px: None,
             lights: [0.0; LIGHTS],
+            steps: Arc::default(),
         })
     }
 
@@ -114,6 +114,16 @@ impl ImageEdges {
                 return Err(Error::argument("edges", "other numbers of lightness", format!("{LIGHTS} finite numbers")));
             }
         }
+        Ok(self)
+    }
+
+    /// The same with which of them are steps of the pixel grid, as no lens draws them, by their numbers within the region, ascending.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless the numbers ascend.
+    pub fn with_steps(mut self, steps: &[u32]) -> Result<Self> {
+        check_ascending(steps)?;
+        self.steps = steps.into();
         Ok(self)
     }
 
@@ -157,6 +167,11 @@ impl ImageEdges {
         &self.lights
     }
 
+    /// Numbers within the region of those that are steps of the pixel grid.
+    pub fn steps(&self) -> &[u32] {
+        &self.steps
+    }
+
     /// Copies them to where the fits read them, if they are of this origin.
     ///
     /// # Errors
@@ -173,4 +188,11 @@ impl ImageEdges {
         out.refill(region, &self.slots, &self.gx, &self.gy);
         Ok(())
     }
+}
+
+fn check_ascending(slots: &[u32]) -> Result<()> {
+    if slots.is_sorted_by(|a, b| a < b) {
+        return Ok(());
+    }
+    Err(Error::argument("edges", "pixels out of order", "each pixel once, in ascending order"))
 }

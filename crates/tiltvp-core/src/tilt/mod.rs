@@ -14,6 +14,7 @@ mod image_edges;
 mod level;
 mod lightness;
 mod methods;
+mod on_grid;
 mod options;
 mod posterior;
 mod scratch;

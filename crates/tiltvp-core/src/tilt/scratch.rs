@@ -27,7 +27,7 @@ impl Scratch {
             detector: Detector::new(region, options),
             made_for: Extent::new(region, options),
             edges: EdgePixels::with_capacity(n),
-            work: Work::with_capacity(n),
+            work: Work::with_capacity(n, region.image_size()),
             segments: None,
         }
     }

@@ -5,6 +5,7 @@ use tiltvp_kernels::compaction::ROOM;
 use super::methods::sampling::SamplingScratch;
 use super::methods::subsample::Subsample;
 use super::trust::FEATURES;
+use crate::edges::StepMap;
 use crate::robust::Rows;
 
 /// What the fits work in.
@@ -17,6 +18,8 @@ pub(super) struct Work {
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
     pub inliers: Inliers,
+    /// Steps of the pixel grid among the rows.
+    pub steps: StepMap,
     /// Of the refined method.
     pub subsample: Subsample<f32>,
     /// Of the sampling methods.
@@ -43,18 +46,36 @@ impl Inliers {
 }
 
 impl Work {
-    /// Room for so many rows.
-    pub(super) fn with_capacity(n: usize) -> Self {
+    /// Room for so many rows, of images of so many columns and rows.
+    pub(super) fn with_capacity(n: usize, size: [usize; 2]) -> Self {
         Self {
             rows: Rows::with_capacity(n + ROOM),
             weights: Vec::with_capacity(n + ROOM),
             slots: Vec::with_capacity(n + ROOM),
             places: Vec::with_capacity(n + ROOM),
             inliers: Inliers::None,
+            steps: StepMap::new(size),
             subsample: Subsample::with_capacity(n),
             sampling: SamplingScratch::default(),
             trusted: [0.0; FEATURES],
         }
+    }
+
+    /// Keeps the rows alone that pass a test of their pixel within the region and their place among the edge pixels.
+    pub(super) fn keep(&mut self, test: impl Fn(u32, u32) -> bool) {
+        let mut kept = 0;
+        for row in 0..self.rows.len() {
+            if test(self.slots[row], self.places[row]) {
+                self.rows.put(row, kept);
+                self.weights[kept] = self.weights[row];
+                (self.slots[kept], self.places[kept]) = (self.slots[row], self.places[row]);
+                kept += 1;
+            }
+        }
+        self.rows.truncate(kept);
+        self.weights.truncate(kept);
+        self.slots.truncate(kept);
+        self.places.truncate(kept);
     }
 
     /// Whether a row agreed with the last estimate.

@@ -105,4 +105,15 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
     /// The fit to the edge pixels of an image, with or without those that the prefilter rejects. Allocates nothing in a scratch
     /// that has served before.
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit;
+
+    /// What fits again without steps of the pixel grid, if the method leaves them out.
+    fn refitter(&self) -> Option<&dyn Refitter> {
+        None
+    }
+}
+
+/// A method that fits again when rows have been left out.
+pub(in crate::tilt) trait Refitter {
+    /// The fit of the rows that are left of the last one.
+    fn refit(&self, pixels: &PixelTables, work: &mut Work) -> Fit;
 }

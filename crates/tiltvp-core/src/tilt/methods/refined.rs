@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::method::{Fitter, Prepared, Setting, TiltMethod};
+use super::method::{Fitter, Prepared, Refitter, Setting, TiltMethod};
 use super::normals::{self, Normals};
 use super::subsample::Subsample;
 use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
@@ -82,6 +82,11 @@ impl Refined {
     /// The fit with the error that the edges which agree tell.
     pub(super) fn fit_alone(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
         self.normals.lift(edges, work);
+        self.fit_rows(pixels, work)
+    }
+
+    /// The fit of the rows.
+    fn fit_rows(&self, pixels: &PixelTables, work: &mut Work) -> Fit {
         let report = refine(&work.rows, &self.options, &mut work.weights, &mut work.subsample);
         let scale = self.options.scale_rad;
         let threshold = INLIER_SCALES * scale;
@@ -126,7 +131,18 @@ impl Fitter for Refined {
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
-        self.fit_alone(edges, pixels, work).diluted(work.rows.len(), self.as_near)
+        self.normals.lift(edges, work);
+        self.refit(pixels, work)
+    }
+
+    fn refitter(&self) -> Option<&dyn Refitter> {
+        Some(self)
+    }
+}
+
+impl Refitter for Refined {
+    fn refit(&self, pixels: &PixelTables, work: &mut Work) -> Fit {
+        self.fit_rows(pixels, work).diluted(work.rows.len(), self.as_near)
     }
 }
 

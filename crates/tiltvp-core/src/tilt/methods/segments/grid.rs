@@ -1,14 +1,12 @@
 //! What is done where edges that agree are steps of the pixel grid: borders, what is burnt in, blocks of compression, broken columns.
 
-use std::f64::consts::FRAC_PI_2;
-
 use super::work::SegmentWork;
 use crate::edges::is_grid_step;
 use crate::geometry::tangent_basis;
 use crate::image::ImageView;
 use crate::segments::{EdgePoint, Segment, Segments};
-use crate::tilt::doubt::Doubt;
 use crate::tilt::estimate::TiltEstimate;
+use crate::tilt::on_grid::{doubt, is_apart, is_as_sure};
 
 /// Share of the pixels that agree from which on the others are asked: of views that are not harmed one in a hundred has as much.
 const SHARE_MIN: f64 = 0.25;
@@ -19,18 +17,11 @@ const POINTS: usize = 5;
 /// By how much in pixels what is along the grid strays from a column or a row at most: noise moves points by half of that.
 const ALONG_PX: f32 = 1.0;
 
-/// By how much in radians, and in standard deviations of theirs, other edges tell another vertical.
-const APART_RAD: f64 = 1f64.to_radians();
+/// By how many standard deviations of theirs other edges tell another vertical.
 const APART_SIGMAS: f64 = 3.0;
 
 /// Share of what agrees from which on it is most of it.
 const MOST: f64 = 0.5;
-
-/// Share of the confidence of all edges that the others need to be believed instead.
-const AS_SURE: f64 = 0.5;
-
-/// Share of the confidence that is left where no other edges tell the same vertical: a view that is drawn without blur may be right.
-const ALONE: f64 = 0.5;
 
 /// So much of what agrees is steps of the pixel grid.
 #[derive(Debug, Clone, Copy)]
@@ -57,8 +48,7 @@ impl OnGrid {
     pub(super) fn doubt(self, told: &mut TiltEstimate, others: &TiltEstimate) {
         let tells = others.tilt.is_some() && others.covariance_rad2[(0, 0)].is_finite();
         if contradicts(others, told) || !tells && self.share >= MOST {
-            told.confidence *= ALONE;
-            told.doubt = told.doubt.or(Some(Doubt::OnGrid { share: self.share }));
+            doubt(told, self.share);
         }
     }
 }
@@ -66,7 +56,7 @@ impl OnGrid {
 /// Whether the other edges tell another vertical, and about as surely: of what is drawn without blur or noise by an upright camera
 /// they are what is left.
 pub(super) fn outdone(told: &TiltEstimate, others: &TiltEstimate) -> bool {
-    others.confidence >= AS_SURE * told.confidence && contradicts(others, told)
+    is_as_sure(others, told) && contradicts(others, told)
 }
 
 /// Some points of a segment.
@@ -111,7 +101,7 @@ pub(super) fn leave_out(image: &ImageView<'_>, work: &mut SegmentWork) {
 fn contradicts(others: &TiltEstimate, told: &TiltEstimate) -> bool {
     let (Some(others_tilt), Some(tilt)) = (others.tilt, told.tilt) else { return false };
     let away = tangent_basis(&others_tilt.normal()).transpose() * tilt.normal();
-    let apart = others_tilt.normal().angle(&tilt.normal());
     let squares = others.covariance_rad2.try_inverse().map_or(0.0, |inverse| away.dot(&(inverse * away)));
-    apart > APART_RAD && (apart > FRAC_PI_2 || squares > APART_SIGMAS * APART_SIGMAS)
+    let is_opposite = others_tilt.normal().dot(&tilt.normal()) < 0.0;
+    is_apart(others, told) && (is_opposite || squares > APART_SIGMAS * APART_SIGMAS)
 }
