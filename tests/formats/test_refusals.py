@@ -62,6 +62,14 @@ REFUSALS: dict[str, tuple[str, str]] = {
         edited("own", ("width = 640", "width = [640]")),
         "a list of 1, expected a number, at camera[0].width",
     ),
+    "a list for an angle": (
+        edited("own", ("width = 640", "max_theta_rad = [1.5]\nwidth = 640")),
+        "a list of 1, expected a number, at camera[0].max_theta_rad",
+    ),
+    "a list for a focal length": (
+        edited("camodocal", ("mu: 210.5", "mu: [210.5]")),
+        "a list of 1, expected a number, at projection_parameters.mu",
+    ),
     "zero width": (edited("camodocal", ("640", "0")), "width = 0, expected 1 to 100000 pixels"),
     "negative focal": (
         edited("camodocal", ("mu: 210.5", "mu: -210.5")),

@@ -102,13 +102,12 @@ class Node:
         return self.value.strip().strip("\"'")
 
     def number(self) -> float:
-        """The value as one finite number; a list of one counts."""
-        value = self.value[0] if isinstance(self.value, list) and len(self.value) == 1 else self.value
-        return self._number(value)
+        """The value as one finite number."""
+        return self._number(self.value)
 
     def integer(self) -> int:
         """The value as a whole number; 1280.0 counts."""
-        number = self._number(self.value)
+        number = self.number()
         if number != math.floor(number) or abs(number) > 1e9:
             self.fail(f"found {_shown(self.value)}", "a whole number")
         return int(number)
