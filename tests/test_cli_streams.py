@@ -265,7 +265,8 @@ def test_stdin(run: Run, world: Path, room: RoomImage, monkeypatch: pytest.Monke
     named, missing = map(json.loads, said.splitlines())
     assert (code, "none.png" in complaints, "none.png" in missing["error"]) == (1, True, True)
     height, width = room.gray.shape
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(room.gray.tobytes() * 2)))
+    pixels = room.gray.tobytes() + bytes([room.gray[0, 0] ^ 1]) + room.gray.tobytes()[1:]
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(pixels)))
     code, said, complaints = run(*words, "--raw", f"{width}x{height}")
     first, second = map(json.loads, said.splitlines())
     assert (code, complaints, first["file"]) == (0, "", "-#000000")

@@ -166,7 +166,7 @@ def test_the_file_that_is_wrong_is_named(tmp_path: Path, capsys: pytest.CaptureF
     sides = [str(tmp_path / side) for side in ("left", "right")]
     rig = ["--calibration", str(tmp_path / "rig.toml"), "--method", "coloured"]
     assert main(["corner", *sides, *rig]) == 2
-    grey, small, broken, _ = capsys.readouterr().err.splitlines()
+    grey, small, broken, *_ = capsys.readouterr().err.splitlines()
     a, b = (f"{tmp_path / 'left' / name} and {tmp_path / 'right' / name}" for name in ("a.png", "b.png"))
     assert grey.startswith(f"tiltvp: {a}: right: shape (360, 480), expected (H, W, 3")
     assert small.startswith(f"tiltvp: {b}: image: got 360 x 240 pixels")
@@ -285,8 +285,8 @@ def test_files_of_equal_names_are_pairs(
 ) -> None:
     StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
     for side, names in (("left", lefts), ("right", rights)):
-        for name in names:
-            tiltvp.write_image(tmp_path / side / f"{name}.png", np.zeros((360, 480), np.uint8))
+        for gray, name in enumerate(names):
+            tiltvp.write_image(tmp_path / side / f"{name}.png", np.full((360, 480), gray, np.uint8))
     said = run("corner", tmp_path / "left", tmp_path / "right", "--calibration", tmp_path / "rig.toml")
     if told is None:
         assert (said.code, said.err) == (0, "")

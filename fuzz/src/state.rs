@@ -85,7 +85,7 @@ fn filter(bytes: &mut Bytes<'_>) {
     for _ in 0..bytes.byte() % 4 {
         let number = bytes.number();
         let place = bytes.below(36);
-        match bytes.below(8) {
+        match bytes.below(10) {
             0 => state.floor[place % 3] = number,
             1 => state.mounting[place % 3] = number,
             2 => state.scene[place % 2] = number,
@@ -96,6 +96,8 @@ fn filter(bytes: &mut Bytes<'_>) {
             4 => state.covariance *= number,
             5 => state.common = state.common.map(|common| common * number),
             6 => state.driven_m = number,
+            7 => state.rolled_m = number,
+            8 => state.latest = Some((Vector3::new(number, 0.0, 1.0).normalize(), own * number)),
             _ => {
                 let normal = Vector3::new(bytes.number(), number, 1.0);
                 let normal = normal.try_normalize(0.0).unwrap_or(normal);

@@ -1355,12 +1355,13 @@ class FilterStep:
         """The attributes by name, arrays as nested lists: plain, good for JSON."""
 
     @property
-    def verdict(self) -> Literal["accepted", "jumped", "no-tilt", "low-confidence", "outside-gate", "lost"]:
+    def verdict(self) -> Literal["accepted", "jumped", "no-tilt", "repeated", "low-confidence", "outside-gate", "lost"]:
         """What was done, in a word.
 
         Fused: "accepted", or "jumped", if so many rejected estimates agreed that the floor's tilt was forgotten. Left
-        out: "no-tilt", "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's tilt is
-        taken to be unknown.
+        out: "no-tilt", "repeated", if it is that of the image before to the last bit though the wheels have rolled,
+        "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's tilt is taken to be
+        unknown.
         """
 
 @final

@@ -151,6 +151,30 @@ fn images_that_say_nothing_are_left_out() {
     assert!(filter.update(&image(Some(Tilt::UPRIGHT), 0.01, 0.51)).accepted());
 }
 
+/// A driver that gives one image again and again made the filter sure of what was true where it was taken.
+#[test]
+fn a_frozen_camera_is_left_out_once_the_wheels_have_rolled() {
+    for (yaw_rad, distance_m) in [(0.0, 0.006), (0.04, 0.0)] {
+        let mut filter = TiltFilter::new(TiltFilterOptions::default()).unwrap();
+        let mut step = |alpha_rad: f64, yaw_rad: f64, distance_m: f64| {
+            filter.predict(yaw_rad, distance_m).unwrap();
+            let tilt = (alpha_rad > 0.0).then(|| Tilt::from_alpha_beta(alpha_rad, 0.1));
+            (filter.update(&image(tilt, 0.008, 0.9)), filter.estimate().sigma_rad)
+        };
+        assert!(step(0.03, 1.0, 1.0).0.accepted() && (0..50).all(|_| step(0.03, 0.0, 0.0).0.accepted()));
+        assert!(step(0.03, yaw_rad, distance_m).0.accepted());
+        let (verdict, sure) = step(0.03, yaw_rad, distance_m);
+        let Verdict::Repeated { rolled_m, limit_m: 0.01 } = verdict else { panic!("{verdict}") };
+        assert!((rolled_m - 0.012).abs() < 1e-12 && !verdict.accepted() && verdict.nis().is_none());
+        assert!(verdict.name() == "repeated" && verdict.to_string().contains("rolled 0.012 m, at most 0.010 m"));
+        assert!(step(0.03, 0.0, 1.0).1 > sure);
+        assert_eq!(step(0.0, 0.0, 0.0).0, Verdict::NoTilt);
+        let names = [0.03, 0.030_001, 0.03, 0.2, 0.2, 0.2].map(|alpha_rad| step(alpha_rad, 0.0, 0.1).0.name());
+        // Nor does it come to agree with itself outside the gate.
+        assert_eq!(names, ["repeated", "accepted", "accepted", "outside-gate", "repeated", "repeated"]);
+    }
+}
+
 #[test]
 fn every_option_changes_something() {
     let base = TiltFilterOptions { mounting: Some(MountingOptions::default()), ..TiltFilterOptions::default() };
@@ -168,8 +192,9 @@ fn every_option_changes_something() {
             } else {
                 0.5
             };
-            let verdict =
-                filter.update(&image(Tilt::from_normal(&lean(degrees, 0.2)), 0.008, 0.45 + 0.02 * f64::from(i)));
+            // No two images are the same.
+            let tilt = Tilt::from_normal(&lean(degrees, 0.2 + 1e-6 * f64::from(i)));
+            let verdict = filter.update(&image(tilt, 0.008, 0.45 + 0.02 * f64::from(i)));
             told.push((verdict, filter.estimate()));
         }
         told
@@ -237,6 +262,9 @@ fn impossible_options_and_arguments_are_refused() {
         TiltFilterState { floor: Vector3::zeros(), ..before.state().clone() },
         TiltFilterState { covariance: -before.state().covariance, ..before.state().clone() },
         TiltFilterState { driven_m: -1.0, ..before.state().clone() },
+        TiltFilterState { rolled_m: f64::NAN, ..before.state().clone() },
+        TiltFilterState { latest: Some((Vector3::zeros(), small())), ..before.state().clone() },
+        TiltFilterState { latest: Some((Vector3::z(), -small())), ..before.state().clone() },
         TiltFilterState { common: Some(Matrix2::zeros()), ..before.state().clone() },
         TiltFilterState { pending: Some((Vector3::zeros(), small())), ..before.state().clone() },
         TiltFilterState { scene: Vector2::new(f64::NAN, 0.0), ..before.state().clone() },

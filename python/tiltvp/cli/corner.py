@@ -18,6 +18,7 @@ from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import FrameRate, Switch, image_size_from
+from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
@@ -183,10 +184,11 @@ class Look:
         Times are those of the frames, if `rate_hz` does not say how many there are in a second. Raises
         `InvalidInputError` for frames without a time where readings of a sensor have times.
         """
+        rights = None if others is None else Repeats(others)
         with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
             lefts = zip(itertools.count(), coming, picture_names(frames), strict=False)
             pairs: Iterable[tuple[tuple[int, Frame, str], Frame | None]]
-            pairs = zip(lefts, itertools.repeat(None)) if others is None else pairs_of(lefts, others, partners or ())
+            pairs = zip(lefts, itertools.repeat(None)) if rights is None else pairs_of(lefts, rights, partners or ())
             for (number, frame, name), partner in pairs:
                 pair = [frame] if partner is None else [frame, partner]
                 time_s = frame.time_s if rate_hz is None else number / rate_hz
@@ -204,6 +206,8 @@ class Look:
                     self._draw(name, number, frame.time_s if rate_hz is None else time_s, images[0], estimate)
                     yield time_s, frame.name, estimate
                 bar.advance()
+        if rights is not None:
+            rights.tell()
 
     def _estimate(self, images: Sequence[NDArray[np.uint8]], time_s: float) -> CornerEstimate:
         if self.independent:

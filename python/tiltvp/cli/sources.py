@@ -17,6 +17,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import WHEEL_BASE_MAX_M
 from tiltvp.cli.options import ABOVE_0, ALL_CORES, AtLeast0, given_words
+from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
 
@@ -222,16 +223,26 @@ def tell(*lines: str) -> None:
 def ending_at_interrupt(frames: Frames, *, ahead: bool = True) -> Iterator[Iterator[Frame]]:
     """The frames; those of a live camera end at the first Ctrl-C, after which what is begun is finished.
 
-    Where all are there already the next ones are decoded while one is worked on, if `ahead`.
+    Where all are there already the next ones are decoded while one is worked on, if `ahead`. A line on stderr says how
+    many images are the same as the one before.
     """
+    repeats = Repeats(frames)
+    if ahead and frames.count is not None:
+        with closing(in_order(_decoded, repeats, _AHEAD)) as coming:
+            yield coming
+    else:
+        with _interruptible(frames):
+            yield iter(repeats)
+    repeats.tell()
+
+
+@contextmanager
+def _interruptible(frames: Frames) -> Iterator[None]:
+    """Within, the first Ctrl-C ends the frames of a live camera, and the second everything."""
     from tiltvp.streams import LiveCamera
 
-    if ahead and frames.count is not None:
-        with closing(in_order(_decoded, frames, _AHEAD)) as coming:
-            yield coming
-        return
     if not isinstance(frames, LiveCamera) or threading.current_thread() is not threading.main_thread():
-        yield iter(frames)
+        yield
         return
     stop = threading.Event()
 
@@ -243,7 +254,7 @@ def ending_at_interrupt(frames: Frames, *, ahead: bool = True) -> Iterator[Itera
 
     before = signal.signal(signal.SIGINT, note)
     try:
-        yield iter(frames)
+        yield
     finally:
         signal.signal(signal.SIGINT, before)
 

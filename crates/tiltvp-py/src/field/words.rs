@@ -66,7 +66,7 @@ words! {
     StopWord: "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach", "chosen",
         "ambiguous", "undetermined";
     /// What a filter did with an estimate.
-    VerdictWord: "accepted", "jumped", "no-tilt", "low-confidence", "outside-gate", "lost";
+    VerdictWord: "accepted", "jumped", "no-tilt", "repeated", "low-confidence", "outside-gate", "lost";
 }
 
 /// Whole numbers on their way out, as a tuple.

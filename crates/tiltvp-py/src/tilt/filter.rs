@@ -15,8 +15,19 @@ use crate::shared::Shared;
 use crate::value::changing;
 
 /// Keys of the dict of a state, by the way of pickle.
-const STATE_KEYS: [&str; 9] =
-    ["floor", "mounting", "scene", "covariance", "common", "driven_m", "pending", "agreeing", "rejected"];
+const STATE_KEYS: [&str; 11] = [
+    "floor",
+    "mounting",
+    "scene",
+    "covariance",
+    "common",
+    "driven_m",
+    "pending",
+    "agreeing",
+    "rejected",
+    "latest",
+    "rolled_m",
+];
 
 /// Fuses the tilts of successive images: a Kalman filter of the ground normal on the sphere.
 ///
@@ -178,9 +189,11 @@ fn written_state<'py>(py: Python<'py>, state: &TiltFilterState) -> PyResult<Boun
     dict.set_item("covariance", state.covariance.as_slice().to_vec())?;
     dict.set_item("common", state.common.as_ref().map(nested))?;
     dict.set_item("driven_m", state.driven_m)?;
-    dict.set_item("pending", state.pending.as_ref().map(|(normal, c)| (normal.as_slice().to_vec(), nested(c))))?;
+    dict.set_item("pending", state.pending.as_ref().map(pair))?;
     dict.set_item("agreeing", state.agreeing)?;
     dict.set_item("rejected", state.rejected)?;
+    dict.set_item("latest", state.latest.as_ref().map(pair))?;
+    dict.set_item("rolled_m", state.rolled_m)?;
     Ok(dict)
 }
 
@@ -192,7 +205,10 @@ fn read_state(values: &Bound<'_, PyDict>) -> PyResult<TiltFilterState> {
     if covariance.len() != 36 {
         return Err(invalid(format!("state[\"covariance\"]: {} numbers, expected 36", covariance.len())));
     }
-    let pending: Option<([f64; 3], [[f64; 2]; 2])> = convert::item(values, "pending", "None or a normal and a matrix")?;
+    let pair = |key: &str| -> PyResult<Option<(Vector3<f64>, Matrix2<f64>)>> {
+        let told: Option<([f64; 3], [[f64; 2]; 2])> = convert::item(values, key, "None or a normal and a matrix")?;
+        Ok(told.map(|(normal, covariance)| (normal.into(), matrix(covariance))))
+    };
     Ok(TiltFilterState {
         floor: vector("floor")?,
         mounting: vector("mounting")?,
@@ -200,10 +216,17 @@ fn read_state(values: &Bound<'_, PyDict>) -> PyResult<TiltFilterState> {
         covariance: Matrix6::from_column_slice(&covariance),
         common: convert::item::<Option<[[f64; 2]; 2]>>(values, "common", "None or a matrix")?.map(matrix),
         driven_m: convert::item(values, "driven_m", "a number")?,
-        pending: pending.map(|(normal, covariance)| (normal.into(), matrix(covariance))),
+        pending: pair("pending")?,
         agreeing: convert::item(values, "agreeing", "a count")?,
         rejected: convert::item(values, "rejected", "a count")?,
+        latest: pair("latest")?,
+        rolled_m: convert::item(values, "rolled_m", "a number")?,
     })
+}
+
+/// A normal and its covariance.
+fn pair((normal, covariance): &(Vector3<f64>, Matrix2<f64>)) -> (Vec<f64>, [[f64; 2]; 2]) {
+    (normal.as_slice().to_vec(), nested(covariance))
 }
 
 /// A matrix as nested rows.

@@ -68,8 +68,9 @@ value! {
         /// What was done, in a word.
         ///
         /// Fused: "accepted", or "jumped", if so many rejected estimates agreed that the floor's tilt was forgotten.
-        /// Left out: "no-tilt", "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's
-        /// tilt is taken to be unknown.
+        /// Left out: "no-tilt", "repeated", if it is that of the image before to the last bit though the wheels have
+        /// rolled, "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's tilt is taken
+        /// to be unknown.
         verdict: VerdictWord,
         /// The same in a sentence, with the measured number and the limit.
         reason: String,

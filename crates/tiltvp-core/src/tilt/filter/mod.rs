@@ -41,12 +41,19 @@ use crate::geometry::{Tilt, tangent_basis, tangent_exp, tangent_log, tangent_tra
 /// **Gate.** An estimate whose normalised innovation squared is beyond the chi-square gate is left out. If `jump_after` of
 /// them in a row agree with each other, the floor has changed: its tilt is forgotten, that of the mounting is not. If
 /// `lost_after` in a row are left out, agreeing or not, the floor's tilt is unknown, and the filter abstains.
+///
+/// **Images that repeat.** Estimates of images ([`update`](Self::update)) that stay the same to the last bit while the wheels
+/// roll are left out from the second on: a camera that is frozen tells nothing of where the robot is now.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TiltFilter {
     options: TiltFilterOptions,
     gate: ChiSquareGate,
     state: TiltFilterState,
 }
+
+/// How far the wheels may roll, in metres, while images stay the same: a thousand times as far as views of 160 x 120 pixels,
+/// drawn without noise, take to differ (1e-5 in each of eight), and more than slack lets wheels of a robot that stands tell.
+const STILL_M: f64 = 0.01;
 
 /// A checked measurement: the normal and its covariance, noise floor included, in the tangent basis at the normal.
 #[derive(Clone, Copy)]
@@ -133,6 +140,7 @@ impl TiltFilter {
         state.scene = of_scene(&(plane_turn * state.scene));
         state.common = state.common.map(|common| symmetric(&(plane_turn * common * plane_turn.transpose())));
         state.driven_m += distance_m;
+        state.rolled_m += rolled_m;
         let wheels = model::robot_from_wheels(&state.mounting);
         state.pending = state.pending.map(|(normal, covariance)| {
             let robot_turn = wheels * turn * wheels.transpose();
@@ -150,10 +158,18 @@ impl TiltFilter {
 
     /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence. One of no finite angles is none.
     pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
-        match tilt.and_then(|tilt| Tilt::from_normal(&tilt.normal())) {
-            Some(tilt) if is_of_angles(covariance_rad2) => self.fuse(tilt.normal(), covariance_rad2, confidence),
-            _ => Verdict::NoTilt,
+        let normal = tilt.and_then(|tilt| Tilt::from_normal(&tilt.normal())).map(|tilt| tilt.normal());
+        let Some(normal) = normal.filter(|_| is_of_angles(covariance_rad2)) else { return Verdict::NoTilt };
+        let told = Some((normal, *covariance_rad2));
+        let rolled_m = if self.state.latest == told { self.state.rolled_m } else { 0.0 };
+        if rolled_m > STILL_M {
+            return Verdict::Repeated { rolled_m, limit_m: STILL_M };
         }
+        let verdict = self.fuse(normal, covariance_rad2, confidence);
+        if !matches!(verdict, Verdict::LowConfidence { .. }) {
+            (self.state.latest, self.state.rolled_m) = (told, rolled_m);
+        }
+        verdict
     }
 
     /// Fuses a ground normal of any length with a covariance in squared radians in its tangent plane, in the basis of
@@ -267,6 +283,8 @@ impl TiltFilter {
             pending: None,
             agreeing: 0,
             rejected: 0,
+            latest: state.latest,
+            rolled_m: state.rolled_m,
         };
         (seen.nis(), Some(after))
     }

@@ -28,6 +28,13 @@ pub enum Verdict {
     },
     /// There is no tilt in it, or none with a finite covariance.
     NoTilt,
+    /// It is that of the image before, to the last bit, though the wheels have rolled: a sensor gives no image twice.
+    Repeated {
+        /// How far they have rolled, in metres, since the first of these estimates.
+        rolled_m: f64,
+        /// The farthest that an estimate may stay the same.
+        limit_m: f64,
+    },
     /// It does not trust itself.
     LowConfidence {
         /// Its confidence.
@@ -62,6 +69,7 @@ impl Verdict {
             Self::Accepted { .. } => "accepted",
             Self::Jumped { .. } => "jumped",
             Self::NoTilt => "no-tilt",
+            Self::Repeated { .. } => "repeated",
             Self::LowConfidence { .. } => "low-confidence",
             Self::OutsideGate { .. } => "outside-gate",
             Self::Lost { .. } => "lost",
@@ -80,7 +88,7 @@ impl Verdict {
             | Self::Jumped { nis, .. }
             | Self::OutsideGate { nis, .. }
             | Self::Lost { nis, .. } => Some(nis),
-            Self::NoTilt | Self::LowConfidence { .. } => None,
+            Self::NoTilt | Self::Repeated { .. } | Self::LowConfidence { .. } => None,
         }
     }
 }
@@ -93,6 +101,11 @@ impl fmt::Display for Verdict {
                 write!(f, "followed a jump: {agreeing} estimates in a row agree (NIS {nis:.2}, limit {limit:.2})")
             }
             Self::NoTilt => write!(f, "an estimate without a tilt, or with an infinite covariance"),
+            Self::Repeated { rolled_m, limit_m } => write!(
+                f,
+                "the same to the last bit as before, while the wheels rolled {rolled_m:.3} m, at most {limit_m:.3} m \
+                 expected: does the camera give one image again and again?"
+            ),
             Self::LowConfidence { confidence, limit } => {
                 write!(f, "confidence {confidence:.3}, at least {limit:.3} expected")
             }

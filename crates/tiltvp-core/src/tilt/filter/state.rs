@@ -33,6 +33,10 @@ pub struct TiltFilterState {
     pub agreeing: u32,
     /// How many estimates in a row the gate has rejected.
     pub rejected: u32,
+    /// The last estimate of an image that was looked at, with its covariance as it was given.
+    pub latest: Option<(Vector3<f64>, Matrix2<f64>)>,
+    /// Metres that the wheels have rolled, turns in place included, since images told that estimate first.
+    pub rolled_m: f64,
 }
 
 /// The floor's, the mounting's and the scene's place in the error state.
@@ -65,6 +69,8 @@ impl TiltFilterState {
             pending: None,
             agreeing: 0,
             rejected: 0,
+            latest: None,
+            rolled_m: 0.0,
         }
     }
 
@@ -100,9 +106,17 @@ impl TiltFilterState {
             unit("pending", normal)?;
             spread("pending", covariance)?;
         }
+        if let Some((normal, covariance)) = &self.latest {
+            unit("latest", normal)?;
+            if !is_of_angles(covariance) {
+                return Err(no_covariance("latest", covariance));
+            }
+        }
         // Infinity is what a sum of very long ways comes to.
-        if self.driven_m.is_nan() || self.driven_m < 0.0 {
-            return Err(Error::argument("driven_m", self.driven_m, "a number of metres"));
+        for (name, metres) in [("driven_m", self.driven_m), ("rolled_m", self.rolled_m)] {
+            if metres.is_nan() || metres < 0.0 {
+                return Err(Error::argument(name, metres, "a number of metres"));
+            }
         }
         Ok(())
     }
