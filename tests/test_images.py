@@ -14,9 +14,11 @@ from PIL import Image
 
 import tiltvp
 from tiltvp.cli.sources import distinct_names
-from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
+from tiltvp.csv_files import CsvFile
+from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.image_headers import header_size
 from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image, read_mask
+from tiltvp.rotations import read_rotation
 from tiltvp.streams import open_frames
 from tiltvp.streams.image_files import find_images
 
@@ -99,6 +101,21 @@ def test_files_without_loss_are_read_back(tmp_path: Path, ending: str) -> None:
     assert [file.name for file in path.parent.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".bmp", ".tiff", ".ppm", ".webp", ".jp2"])
+def test_an_image_in_place_of_another_file_is_told_to_be_one(tmp_path: Path, ending: str) -> None:
+    """It was told to be no text, and a large one to be larger than calibrations are."""
+    noise = np.random.default_rng(0).integers(0, 255, (900, 900, 3), dtype=np.uint8)
+    cv2.imwrite(str(path := tmp_path / f"image{ending}"), noise)
+    for read, expected in (
+        (tiltvp.Camera.load, "a calibration file"),
+        (read_rotation, "a file with a rotation"),
+        (tiltvp.TrainedCorrection.load, "a file written by `tiltvp lab train`"),
+        (lambda file: CsvFile(file, "odometry as CSV"), "odometry as CSV"),
+    ):
+        with pytest.raises(TiltvpError, match=rf"image{ending}: is an image, expected {expected}"):
+            read(path)
+
+
 def test_colour_and_odd_names(tmp_path: Path) -> None:
     path = tmp_path / "Küche 1 台所.png"
     colour = np.dstack([LEVELS, LEVELS.T, LEVELS[::-1]])
@@ -126,6 +143,11 @@ def test_what_is_written_is_what_was_meant(tmp_path: Path) -> None:
     tiltvp.write_image(tmp_path / "photograph.png", LEVELS)
     with pytest.raises(InvalidInputError, match=r"photograph\.png: .* other than two tones, expected a mask: white"):
         read_mask(tmp_path / "photograph.png")
+    (tmp_path / "camera.toml").write_text("[camera]")
+    with pytest.raises(
+        ImageFileError, match=r"camera\.toml: not an image .* \(8 bytes\), expected a mask: white where"
+    ):
+        read_mask(tmp_path / "camera.toml")
     tiltvp.write_image(tmp_path / "a.bmp", deep)
     assert np.array_equal(read_image(tmp_path / "a.bmp"), LEVELS)
     for other in (LEVELS.astype(np.int16), 1.0 * LEVELS, LEVELS.astype(complex)):

@@ -50,6 +50,7 @@ CORRECTION_KINDS: Final = ("posterior", "affine", "factor")
 """What `train_correction` trains: P(alpha | l) of section 5.1 of Fleer 2017, a and b of section 4, a of eq. 30 or a' of
 eq. 45."""
 _FORMAT: Final = "tiltvp-correction"
+_FILE: Final = "a file written by `tiltvp lab train`"
 _MOUNTING: Final = "robot_from_camera"
 _VERSION: Final = 1
 _FREE: Final = ("correction", "mask", "seed", _MOUNTING)
@@ -84,7 +85,7 @@ class TrainedCorrection:
         """The correction of a file of `save`. Raises `CalibrationError` that says what was wrong and where."""
         from tiltvp.formats.document import Document
 
-        return cls._read(Document.load(path))
+        return cls._read(Document.load(path, _FILE))
 
     @classmethod
     def _read(cls, document: Document) -> Self:
@@ -94,7 +95,7 @@ class TrainedCorrection:
         from tiltvp.formats.node import Node
 
         path = document.path
-        root = Node(document, document.toml("a file written by `tiltvp lab train`"))
+        root = Node(document, document.toml(_FILE))
         if not root.has("format") or root.need("format").text() != _FORMAT:
             root.fail("it is no correction", f'format = "{_FORMAT}"')
         root.only("format", "version", "kind", "method", "images", "correction", "options", "camera", _MOUNTING)

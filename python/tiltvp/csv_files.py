@@ -12,6 +12,7 @@ from typing import Final
 from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import read_text
+from tiltvp.image_headers import is_image_file
 
 __all__ = ["LARGEST_CSV_BYTES", "CsvFile"]
 
@@ -28,12 +29,10 @@ class CsvFile:
         self._expected = expected
         try:
             text = read_text(path, LARGEST_CSV_BYTES)
-        except OSError as error:
-            raise InvalidInputError(
-                f"{self.name}: cannot be read ({error.strerror or error}), expected {expected}"
-            ) from error
-        except UnicodeDecodeError as error:
-            raise InvalidInputError(f"{self.name}: not UTF-8, expected {expected}") from error
+        except (OSError, UnicodeDecodeError) as error:
+            problem = f"cannot be read ({error.strerror or error})" if isinstance(error, OSError) else "not UTF-8"
+            what = "is an image" if is_image_file(path) else problem
+            raise InvalidInputError(f"{self.name}: {what}, expected {expected}") from error
         self._lines = csv.reader(io.StringIO(text, newline=None))
         self.header = [cell.strip() for cell in self._next() or []]
 

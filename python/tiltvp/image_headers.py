@@ -7,9 +7,10 @@ import os
 import re
 import struct
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Final
 
-__all__ = ["file_orientation", "header_size", "orientation", "unturned"]
+__all__ = ["file_orientation", "header_size", "is_image_file", "orientation", "unturned"]
 
 # Compiled at the first file and not at the import, a tenth of whose time that would be; `re` keeps them.
 _PNM: Final = rb"P[1-7](?:\s|#[^\n]*\n)+"
@@ -17,6 +18,8 @@ _PNM_NUMBER: Final = rb"(?:\s|#[^\n]*\n)*(\d{1,9})"
 _PAM_SIDE: Final = rb"(?m)^(WIDTH|HEIGHT)[ \t]+(\d{1,9})\s*$"
 JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _TIFF: Final = rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]"
+_BEGIN_BYTES: Final = 16
+"""In which each kind tells itself."""
 _HEAD_BYTES: Final = 1 << 17
 """Of a photograph, among which its orientation tag is: it has to be in the first 64 kB of segments."""
 _TIFF_TYPES: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
@@ -32,6 +35,16 @@ def header_size(data: bytes) -> tuple[int, int] | None:
                 return None
             return size if size is not None and min(size) > 0 else None
     return None
+
+
+def is_image_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a regular file begins as images do whose header can be read; false for one that cannot be opened."""
+    with suppress(OSError, ValueError):
+        if os.path.isfile(path):
+            with open(path, "rb", buffering=0) as file:
+                data = file.read(_BEGIN_BYTES)
+            return any(re.match(begin, data, re.DOTALL) for begin, _ in _READERS)
+    return False
 
 
 def orientation(data: bytes) -> int:

@@ -196,15 +196,16 @@ def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
 
     Raises `ImageFileError` as `read_image` does, `InvalidInputError` for a photograph.
     """
-    gray = gray_from(read_image(path), str(path))
+    expected = "a mask: white where images show the world, black elsewhere"
+    try:
+        gray = gray_from(read_image(path), str(path))
+    except ImageFileError as error:
+        raise ImageFileError(f"{error}, expected {expected}") from None
     light = gray > 127
     tones = [tone for tone in (gray[light], gray[~light]) if tone.size]
     astray = sum(np.count_nonzero(np.abs(tone - np.median(tone)) > _TONE) for tone in tones) / gray.size
     if astray > _ASTRAY:
-        raise InvalidInputError(
-            f"{path}: {astray:.0%} of its pixels are of other than two tones, expected a mask: white where images show "
-            "the world, black elsewhere"
-        )
+        raise InvalidInputError(f"{path}: {astray:.0%} of its pixels are of other than two tones, expected {expected}")
     return light
 
 

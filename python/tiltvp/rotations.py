@@ -91,9 +91,7 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     file = path_from(source)
     if not os.path.exists(file):
         raise _missing(str(source), is_word=file.name == str(source) and not file.suffix)
-    if file.is_dir():
-        raise CalibrationError(f"{file}: is a folder, expected a file with a rotation")
-    return rotation_from_document(Document.load(file))
+    return rotation_from_document(Document.load(file, "a file with a rotation"))
 
 
 def rotation_from_document(document: Document) -> Matrix:

@@ -84,6 +84,8 @@ def test_paths(tmp_path: Path) -> None:
     for raw, words in (
         (b"\xff\xfe\x00\x01", "is not text, expected UTF-8, at byte 0"),
         (b"a" * (5 << 20), "larger than"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(9), "raw: is an image, expected a calibration file, at this path"),
+        (b"\xff\xd8\xff" + bytes(5 << 20), "raw: is an image, expected a calibration file, at this path"),
     ):
         (tmp_path / "raw").write_bytes(raw)
         with pytest.raises(CalibrationError, match=words):

@@ -15,6 +15,7 @@ from typing import Final, NoReturn
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError
 from tiltvp.files import read_bytes
 from tiltvp.formats.yaml_text import tree_of
+from tiltvp.image_headers import is_image_file
 
 Tree = dict[str, object]
 
@@ -46,28 +47,28 @@ class Document:
         return Document(Path(source), "")
 
     @staticmethod
-    def load(path: str | os.PathLike[str]) -> Document:
+    def load(path: str | os.PathLike[str], expected: str = "a calibration file") -> Document:
         """Reads the file; a missing, unreadable, empty, oversized or binary one is a `CalibrationError`."""
         try:
             file = Path(path)
             raw = read_bytes(file, LARGEST_BYTES)
+            if len(raw) >= 8 and not any(raw[_COUNT_BYTES:8]):
+                return Document(file, "", raw)
+            text = raw.decode("utf-8-sig")
         except FileNotFoundError:
-            raise CalibrationNotFoundError(f"{path}: no such file, expected a calibration file, at this path") from None
+            raise CalibrationNotFoundError(f"{path}: no such file, expected {expected}, at this path") from None
         except IsADirectoryError:
-            raise CalibrationError(f"{path}: is a folder, expected a calibration file, at this path") from None
+            raise CalibrationError(f"{path}: is a folder, expected {expected}, at this path") from None
         except (OSError, ValueError, TypeError) as error:
             why = (error.strerror if isinstance(error, OSError) else None) or error
-            raise CalibrationError(
-                f"{path!s}: cannot be read ({why}), expected a calibration file, at this path"
-            ) from None
-        if len(raw) >= 8 and not any(raw[_COUNT_BYTES:8]):
-            return Document(file, "", raw)
-        try:
-            text = raw.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise CalibrationError(f"{path}: is not text, expected UTF-8, at byte {error.start}") from None
+            problem = f"cannot be read ({why})"
+            if not isinstance(error, TypeError) and is_image_file(path):
+                problem = "is an image"
+            elif isinstance(error, UnicodeDecodeError):
+                raise CalibrationError(f"{path}: is not text, expected UTF-8, at byte {error.start}") from None
+            raise CalibrationError(f"{path!s}: {problem}, expected {expected}, at this path") from None
         if not text.strip():
-            raise CalibrationError(f"{path}: is empty, expected a calibration, at line 1")
+            raise CalibrationError(f"{path}: is empty, expected {expected}, at line 1")
         return Document(file, text.replace("\r\n", "\n").replace("\r", "\n"))
 
     def fail(self, problem: str, expected: str, at: str, error: type[CalibrationError] = CalibrationError) -> NoReturn:

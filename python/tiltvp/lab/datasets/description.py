@@ -151,7 +151,7 @@ def _mask(file: Path, camera: Camera | None, findings: Findings) -> NDArray[np.b
     try:
         mask = read_mask(file)
     except (ImageFileError, InvalidInputError) as error:
-        findings.add(file, None, str(error).removeprefix(f"{file}: "), expected)
+        findings.add(file, None, str(error).removeprefix(f"{file}: ").partition(", expected ")[0], expected)
         return None
     if camera is not None and mask.shape != (camera.height, camera.width):
         found = f"{mask.shape[1]} x {mask.shape[0]} pixels"
