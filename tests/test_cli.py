@@ -59,6 +59,10 @@ def test_help_is_quick_and_names_the_commands(run: Run) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     for heavy in ("polars", "matplotlib"):
         assert f"'{heavy}'" not in done.stdout
+    one = program.replace("--help", "tilt', '--help")
+    done = subprocess.run([sys.executable, "-c", one], capture_output=True, text=True, check=True, timeout=60)
+    others = {"tiltvp.cli.calibrate", "tiltvp.cli.corner", "tiltvp.cli.lab"}
+    assert not others & set(re.findall("'([^']*)'", done.stdout.splitlines()[-1]))
 
 
 @pytest.mark.slow

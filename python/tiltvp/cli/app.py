@@ -8,18 +8,16 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
+from typing import Final
 
 from cyclopts import CycloptsError, MissingArgumentError
 
-from tiltvp.cli import calibrate, camera_making, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
-from tiltvp.cli.lab import dataset, evaluate, measure, report, train
 from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain, open_closed_streams, print_any_name
 from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
-from tiltvp.streams.outputs.viewer import VIEWER
 
 __all__ = ["app", "run_words"]
 
@@ -27,23 +25,28 @@ _OVERWRITE = "--overwrite"
 """Anywhere in the line: every command that writes keeps what exists without it."""
 SOME_FAILED, WRONG_USE = 1, 2
 
-app.command(setup.setup)
-app.command(tilt.tilt)
-app.command(mount.mount)
-app.command(level.level)
-app.command(segments.segments)
-app.command(lines.lines)
-app.command(track.track)
-app.command(corner.corner)
-app.command(calibrate.calibrate)
-app.command(colmap.colmap)
-app.command(demo.demo)
-app.command(camera_making.app)
-app.command(dataset.app)
-app.command(train.app)
-app.command(evaluate.evaluate)
-app.command(measure.app)
-app.command(report.report)
+_VERBS: Final = {
+    "setup": "setup:setup",
+    "tilt": "tilt:tilt",
+    "mount": "mount:mount",
+    "level": "level:level",
+    "segments": "segments:segments",
+    "lines": "lines:lines",
+    "track": "track:track",
+    "corner": "corner:corner",
+    "calibrate": "calibrate:calibrate",
+    "colmap": "colmap:colmap",
+    "demo": "demo:demo",
+    "camera": "camera_making:app",
+    "dataset": "lab.dataset:app",
+    "lab": "lab.train:app",
+    "evaluate": "lab.evaluate:evaluate",
+    "measure": "lab.measure:app",
+    "report": "lab.report:report",
+}
+"""What each command is in `tiltvp.cli`. Only the one that is run is imported."""
+for _name, _place in _VERBS.items():
+    app.command(f"tiltvp.cli.{_place}", name=_name)
 
 
 def run_words(arguments: Sequence[str] | None) -> int:
@@ -53,9 +56,14 @@ def run_words(arguments: Sequence[str] | None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words
     words = [word for word in words if word != _OVERWRITE]
+    if words[:1] in ([], ["--help"], ["-h"]):
+        for name in _VERBS:
+            app[name]  # Imports it, for the list of commands has the first sentence of each.
     for place in [place for place, word in enumerate(words) if word == RERUN]:
         following = "".join(words[place + 1 : place + 2])
         if following.startswith("-") or (_is_there(following) and not following.lower().endswith(".rrd")):
+            from tiltvp.streams.outputs.viewer import VIEWER
+
             # Without a file it is the viewer that is meant; an option takes a word, or none, not both.
             words[place] = f"{RERUN}={VIEWER}"
     for place in [place for place, word in enumerate(words) if word == "-"]:
