@@ -6,6 +6,7 @@ import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from tiltvp.cli.sources import distinct_names
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.image_headers import header_size
-from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image, read_mask
+from tiltvp.images import bgr_from, decode_as_stored, gray_from, is_as_stored, read_image, read_mask
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import open_frames
 from tiltvp.streams.image_files import find_images
@@ -114,6 +115,22 @@ def test_an_image_in_place_of_another_file_is_told_to_be_one(tmp_path: Path, end
     ):
         with pytest.raises(TiltvpError, match=rf"image{ending}: is an image, expected {expected}"):
             read(path)
+
+
+@pytest.mark.parametrize(
+    ("mode", "clear", "once"),
+    [
+        *((mode, None, True) for mode in ("1", "L", "P", "RGB")),
+        *((mode, None, False) for mode in ("LA", "RGBA", "I;16")),
+        *((mode, clear, False) for mode, clear in (("L", 7), ("P", 7), ("RGB", (7, 7, 7)))),
+    ],
+)
+def test_a_png_is_decoded_once_if_nothing_of_it_is_lost(mode: str, clear: Any, once: bool, tmp_path: Path) -> None:
+    image = Image.fromarray(LEVELS.astype(np.uint16)) if mode == "I;16" else Image.fromarray(LEVELS).convert(mode)
+    image.save(path := tmp_path / "a.png", **({} if clear is None else {"transparency": clear}))
+    data = path.read_bytes()
+    assert is_as_stored(data) == once
+    assert not once or np.array_equal(read_image(path), decode_as_stored(data))
 
 
 def test_colour_and_odd_names(tmp_path: Path) -> None:

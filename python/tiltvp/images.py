@@ -27,6 +27,7 @@ __all__ = [
     "decode_image",
     "gray_from",
     "grays_from",
+    "is_as_stored",
     "is_shallow",
     "pixels_from",
     "read_image",
@@ -45,6 +46,8 @@ _TONE, _ASTRAY = 16, 0.15
 """Grey levels by which pixels of a mask may be off its two tones, and the share of those that are farther off: 0.12 of
 a mask whose borders were blurred by 6 pixels, 0.01 by the strongest compression of JPEG, 0.21 and more of 114
 photographs."""
+_NO_ALPHA: Final = (0, 2, 3)
+"""Colour types of PNG, of which 4 and 6 have opacity for each pixel (PNG 11.2.2)."""
 _DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jp2")
 """Endings of the files that hold 16 bits a value."""
 
@@ -265,6 +268,11 @@ def decode_as_stored(data: bytes) -> NDArray[Any]:
     import cv2
 
     return np.asarray(cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), cv2.IMREAD_UNCHANGED))
+
+
+def is_as_stored(data: bytes) -> bool:
+    """Whether `decode_image` gives all that `decode_as_stored` does: of a PNG of at most 8 bits and without opacity."""
+    return data[12:16] == b"IHDR" and data[24] <= 8 and data[25] in _NO_ALPHA and b"tRNS" not in data
 
 
 def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:

@@ -250,12 +250,12 @@ def _write(outcome: Outcome, image: NDArray[np.uint8], data: bytes, path: Path, 
     import numpy as np
 
     from tiltvp.files import write_whole
-    from tiltvp.images import decode_as_stored, write_image
+    from tiltvp.images import decode_as_stored, is_as_stored, write_image
     from tiltvp.photos import encode_like, is_jpeg, pose_deg, with_pose
 
     tilt = work.believed(outcome)
     # PNG holds 16 bits and opacity, where edges are looked for in 8 bits of what is there.
-    stored = decode_as_stored(data) if path.suffix == ".png" and not is_jpeg(data) else image
+    stored = image if path.suffix != ".png" or is_jpeg(data) or is_as_stored(data) else decode_as_stored(data)
     try:
         if tilt is None:
             if work.copies and path.suffix == outcome.file.suffix:
