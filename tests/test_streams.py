@@ -15,8 +15,10 @@ import pytest
 
 import tiltvp
 from recordings import KINDS, START_S, Bag, write_video
+from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError
 from tiltvp.streams import (
+    InertialSamples,
     NamedImages,
     RawImages,
     Recording,
@@ -24,6 +26,7 @@ from tiltvp.streams import (
     image_from_message,
     inertial_samples,
     open_frames,
+    read_odometry,
     recorded_camera,
     robot_from_camera,
 )
@@ -361,3 +364,12 @@ def test_frames_are_decoded_late(tmp_path: Path) -> None:
     read: Callable[[], object] = next(iter(open_frames([tmp_path / "none.png"]))).read
     with pytest.raises(ImageFileError, match="none"):
         read()
+
+
+@pytest.mark.parametrize(("mark", "told"), [(";", "semicolons"), ("\t", "tabs")])
+def test_tables_with_other_marks_than_commas_are_told_to_have_them(mark: str, told: str, tmp_path: Path) -> None:
+    """They were told to have one unknown column."""
+    (path := tmp_path / "table.csv").write_text(f"time_s{mark}yaw_rad\n1,5{mark}0\n")
+    for read in (read_odometry, InertialSamples.read, lambda table: read_drive_log(table, table)):
+        with pytest.raises(InvalidInputError, match=rf"table\.csv, line 1: {told} between the cells, expected commas"):
+            read(path)

@@ -6,8 +6,9 @@ import csv
 import io
 import math
 import os
+import re
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, Self
 
 from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
@@ -35,6 +36,15 @@ class CsvFile:
             raise InvalidInputError(f"{self.name}: {what}, expected {expected}") from error
         self._lines = csv.reader(io.StringIO(text, newline=None))
         self.header = [cell.strip() for cell in self._next() or []]
+
+    @classmethod
+    def asked(cls, path: str | os.PathLike[str], expected: str) -> Self:
+        """A table that somebody named. Raises `InvalidInputError`, also for other marks than commas between cells."""
+        table = cls(path, expected)
+        if len(table.header) == 1 and (between := re.search("[;\t]", table.header[0])):
+            what = "semicolons" if between[0] == ";" else "tabs"
+            raise InvalidInputError(f"{table.where(1)}: {what} between the cells, expected commas")
+        return table
 
     def where(self, line: int) -> str:
         """The place of a line, for messages."""

@@ -163,7 +163,7 @@ def _doubled_at_once(rows: NDArray[np.float64], times_s: NDArray[np.float64]) ->
 
 def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str = "") -> tuple[CsvFile, dict[str, int]]:
     """The file, and the places of its columns."""
-    table = CsvFile(path, "a CSV file")
+    table = CsvFile.asked(path, "a CSV file")
     expected = ", ".join(names)
     for name in names:
         count = table.header.count(name)

@@ -96,7 +96,7 @@ class InertialSamples:
 
         Raises `InvalidInputError` that names file and line.
         """
-        table = CsvFile(path, "readings of an inertial sensor as CSV")
+        table = CsvFile.asked(path, "readings of an inertial sensor as CSV")
         wanted = ("time_s", *_RATES)
         has_forces = any(name in table.header for name in _FORCES)
         wanted += _FORCES if has_forces else ()

@@ -53,7 +53,7 @@ class OdometryTable:
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> OdometryTable:
         """Reads a CSV file. Raises `InvalidInputError` that names file and line."""
-        table = CsvFile(path, "odometry as CSV")
+        table = CsvFile.asked(path, "odometry as CSV")
         kind = _kind_of(table.name, table.header)
         names = [_ALIASES.get(column, column) for column in table.header]
         places = {name: place for place, name in enumerate(names) if name not in ("file", "step")}
