@@ -14,6 +14,7 @@ from tiltvp import Camera, Robot, check_setup, check_turns, find_setup, frame_de
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image, write_image
+from tiltvp.robot_setup import spread
 from tiltvp.rotations import about_vertical, levelling
 from tiltvp.setup_check import opposite_direction
 from tiltvp.streams import NamedImages, Odometry, Wheels, open_frames
@@ -191,6 +192,17 @@ def test_too_few_images_are_refused(drive):
         frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(count)])
         with pytest.raises(InvalidInputError, match=f"{words} the camera's size, expected 5 or more"):
             find_setup(frames, CAMERA)
+
+
+def test_images_of_a_frozen_camera_count_once(drive, tmp_path):
+    """Sixteen times as often as they are, edges that were a little bent told of another lens."""
+    for k in range(COUNT):
+        (tmp_path / f"{k:02d}.png").write_bytes((drive / "frames" / f"{min(k, 8):02d}.png").read_bytes())
+    frames = open_frames(tmp_path)
+    assert [number for number, _ in spread(frames, CAMERA, COUNT)] == list(range(9))
+    assert find_setup(frames, CAMERA).direction.reason.startswith("9 images")
+    with pytest.raises(InvalidInputError, match=r"1 image of .*, expected 5 or more of .*, each another than"):
+        find_setup(open_frames(sorted(tmp_path.iterdir())[8:]), CAMERA)
 
 
 def test_frames_and_motions_that_do_not_fit_are_refused(drive):

@@ -149,7 +149,7 @@ def find_setup(
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
         words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
-        words = f"{words} of {camera.width} x {camera.height} pixels"
+        words = f"{words} of {camera.width} x {camera.height} pixels, each another than the one before"
         raise InvalidInputError(f"{frames.source}: {words}{_first_problem(frames, camera)}")
     rim, body = None, BodyMask(None, 0, "a mask was given")
     if mask is None:
@@ -271,7 +271,10 @@ def joined_mask(rim: NDArray[np.bool_] | None, body: BodyMask) -> NDArray[np.boo
 
 
 def spread(frames: Frames, camera: _core.Camera, parts: int) -> Iterator[tuple[int, Image]]:
-    """Number and image of the first usable frame in each of so many parts of a source; none of one that comes once."""
+    """Number and image of the first usable frame in each of so many parts of a source; none of one that comes once.
+
+    The image of the part before, as of a frozen camera, tells nothing new, and would count as often as it is there.
+    """
     count = frames.count or 0
     starts = [part * count // parts for part in range(parts + 1)]
     tried = [
@@ -280,10 +283,12 @@ def spread(frames: Frames, camera: _core.Camera, parts: int) -> Iterator[tuple[i
         for number in range(starts[part], min(starts[part + 1], starts[part] + _TRIES))
     ]
     coming = frames.sample([number for _, number in tried]) if tried else iter(())
-    had = -1
+    had, before = -1, None
     for (part, number), frame in zip(tried, coming, strict=False):
-        if part != had and (image := _usable(frame, camera)) is not None:
-            had = part
+        if part == had or (image := _usable(frame, camera)) is None:
+            continue
+        if before is None or not np.array_equal(image, before):
+            had, before = part, image
             yield number, image
 
 
