@@ -92,6 +92,13 @@ def test_paths(tmp_path: Path) -> None:
             read_cameras(str(tmp_path / "raw"))
 
 
+def test_toml_of_something_else_is_not_told_what_json_and_yaml_say_of_it(tmp_path: Path) -> None:
+    for text in ("[camera]\nwidth = 640\n", 'format = "tiltvp-camara"\n'):
+        (tmp_path / "dataset.toml").write_text(text)
+        with pytest.raises(CalibrationError, match=r"no .* \(TOML without format = \"tiltvp-camera\"\), expected"):
+            read_cameras(tmp_path / "dataset.toml")
+
+
 def test_format_names(read: Read) -> None:
     text = SAMPLES["kalibr"].text
     assert read(text, "Kalibr")[0].format == "kalibr"

@@ -156,6 +156,8 @@ def _recognised(document: Document) -> Format:
             UnsupportedFormatError,
         )
     why = f" (read as keys: {document.syntax_problem})" if document.syntax_problem else ""
+    if document.path.suffix.lower() == ".toml":
+        why = ' (TOML without format = "tiltvp-camera")'
     document.fail(
         f"no known calibration format{why}",
         "one of " + ", ".join(one.name for one in FORMATS),
