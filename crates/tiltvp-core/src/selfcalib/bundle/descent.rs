@@ -1,12 +1,12 @@
 //! The solution of a bundle problem: Gauss-Newton where it is nearly solved, Levenberg-Marquardt elsewhere.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, Vector2, Vector3};
 
 use super::cholesky::CholeskyFactor;
 use super::problem::BundleProblem;
 use super::schur::ReducedSystem;
 use crate::interrupt::check;
-use crate::selfcalib::model::FitSummary;
+use crate::selfcalib::model::{FitSummary, InverseDistanceLandmark, between, compose};
 
 /// Damping, as a share of the normal equations' diagonal, with which Levenberg-Marquardt starts where little is known: small
 /// against every parameter that the drive determines, large against those that it does not.
@@ -41,22 +41,59 @@ pub(crate) struct Solution {
     pub(crate) fit: FitSummary,
 }
 
-/// The values of all unknowns.
+/// The values of all unknowns, and the anchors of the landmarks.
 struct SavedValues {
     poses: Vec<Vector3<f64>>,
     shared: DVector<f64>,
+    landmarks: Vec<InverseDistanceLandmark>,
 }
 
 impl BundleProblem {
     fn save(&self) -> SavedValues {
-        SavedValues { poses: self.keyframes.iter().map(|keyframe| keyframe.pose).collect(), shared: self.shared() }
+        SavedValues { poses: self.poses(), shared: self.shared(), landmarks: self.landmarks.clone() }
     }
 
     fn restore(&mut self, saved: &SavedValues) {
         for (keyframe, pose) in self.keyframes.iter_mut().zip(&saved.poses) {
             keyframe.pose = *pose;
         }
+        self.landmarks.clone_from(&saved.landmarks);
         self.set_shared(&saved.shared);
+    }
+
+    fn poses(&self) -> Vec<Vector3<f64>> {
+        self.keyframes.iter().map(|keyframe| keyframe.pose).collect()
+    }
+
+    /// Moves the anchors of landmarks with the poses that first see them, and their steps to what is left: the step changes their places in the
+    /// frames of these poses as it does to first order. From a fixed anchor the step of a landmark that goes with a pose by decimetres
+    /// errs by its square, in all of its bearings. Does nothing, and says so, where the prior knows the direction of a landmark.
+    fn carry_landmarks(&mut self, before: &SavedValues) -> bool {
+        let free = self.free.width();
+        let knows = |i: usize| self.prior_information[(free + 2 * i, free + 2 * i)] > 0.0;
+        if (0..self.landmarks.len()).any(knows) {
+            return false;
+        }
+        let mut carried = vec![false; self.landmarks.len()];
+        for (keyframe, old_pose) in self.keyframes.iter().zip(&before.poses) {
+            let step = keyframe.pose - old_pose;
+            for seen in &keyframe.observations {
+                if std::mem::replace(&mut carried[seen.landmark], true) {
+                    continue;
+                }
+                let old = before.landmarks[seen.landmark];
+                let point = old.homogeneous();
+                // How the landmark moves with the pose, in units of its distance, and the step from a fixed anchor that makes it so.
+                let from_pose = (old.anchor - old_pose.xy()) * point.inverse_distance + point.along;
+                let moved = step.xy() * point.inverse_distance + Vector2::new(-from_pose.y, from_pose.x) * step.z;
+                let anchor = Vector3::new(old.anchor.x, old.anchor.y, 0.0);
+                let landmark = &mut self.landmarks[seen.landmark];
+                landmark.anchor = compose(&keyframe.pose, &between(old_pose, &anchor)).xy();
+                landmark.direction += step.z - point.along.perp(&moved);
+                landmark.log_inverse_distance += point.along.dot(&moved);
+            }
+        }
+        true
     }
 
     /// Moves all unknowns by the solution of normal equations. Returns the predicted reduction of the cost by the step of the
@@ -97,7 +134,10 @@ impl BundleProblem {
             let system = self.eliminate_poses(last, false, damping);
             let moved = system.and_then(|system| Some(system.predicted_reduction + self.take_step(&system)?));
             let at_minimum = moved.is_some_and(|predicted| predicted < tolerance) && damping < CONVERGED_DAMPING;
-            let lower = moved.map(|_| self.cost()).filter(|next| next.is_finite() && *next <= cost + ROUNDING * cost);
+            let is_lower = |next: &f64| next.is_finite() && *next <= cost + ROUNDING * cost;
+            let fixed = moved.map(|_| self.cost()).filter(is_lower);
+            let carried = fixed.is_none() && moved.is_some() && self.carry_landmarks(&before);
+            let lower = fixed.or_else(|| carried.then(|| self.cost()).filter(is_lower));
             if let Some(next) = lower {
                 let small_gain = cost - next < tolerance && damping < CONVERGED_DAMPING;
                 cost = next;
@@ -169,4 +209,64 @@ impl BundleProblem {
 /// Whether a cost is above another one beyond rounding, or NaN.
 fn rises(cost: f64, reached: f64) -> bool {
     cost.is_nan() || cost > reached * (1.0 + ROUNDING)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::bundle::{FreeParameters, Keyframe, Observation};
+    use crate::selfcalib::model::BearingLoss;
+    use crate::selfcalib::options::SelfCalibratorOptions;
+
+    const LANDMARK: InverseDistanceLandmark =
+        InverseDistanceLandmark { anchor: Vector2::new(2.0, -1.0), direction: 0.4, log_inverse_distance: -1.6 };
+
+    /// A pose that sees a landmark.
+    fn problem() -> BundleProblem {
+        let options = SelfCalibratorOptions::default();
+        let mut problem =
+            BundleProblem::new(&options, &Vector3::zeros(), FreeParameters::default(), BearingLoss::Huber(2.0));
+        problem.add_landmark(LANDMARK, -1.6, 1.0);
+        let seen = Observation::new(0, 0.3);
+        problem.keyframes.push(Keyframe { pose: Vector3::new(3.0, 1.5, 0.8), ..Keyframe::anchor() });
+        problem.keyframes[1].observations.push(seen);
+        problem
+    }
+
+    fn point(landmark: &InverseDistanceLandmark) -> Vector3<f64> {
+        let point = landmark.homogeneous();
+        (point.anchor + point.along / point.inverse_distance).push(0.0)
+    }
+
+    #[test]
+    fn a_landmark_that_goes_with_its_pose_stays_in_its_frame() {
+        let mut problem = problem();
+        let before = problem.save();
+        let step = Vector3::new(0.2, -0.1, 0.05);
+        // What the step makes of the landmark from its fixed anchor, to first order.
+        let (pose, along) = (before.poses[1], LANDMARK.homogeneous().along);
+        let from_pose = point(&LANDMARK).xy() - pose.xy();
+        let moved =
+            (step.xy() + Vector2::new(-from_pose.y, from_pose.x) * step.z) * LANDMARK.log_inverse_distance.exp();
+        problem.keyframes[1].pose += step;
+        problem.landmarks[0].direction += along.perp(&moved);
+        problem.landmarks[0].log_inverse_distance -= along.dot(&moved);
+        let in_frame = |problem: &BundleProblem| between(&problem.keyframes[1].pose, &point(&problem.landmarks[0]));
+        let expected = between(&pose, &point(&LANDMARK)).xy();
+        assert!((in_frame(&problem).xy() - expected).norm() > 1e-3);
+        assert!(problem.carry_landmarks(&before));
+        assert!((in_frame(&problem).xy() - expected).norm() < 1e-12);
+        problem.restore(&before);
+        assert!(problem.landmarks[0] == LANDMARK && problem.keyframes[1].pose == pose);
+    }
+
+    #[test]
+    fn landmarks_whose_direction_the_prior_knows_stay() {
+        let mut problem = problem();
+        let before = problem.save();
+        let at = problem.free.width();
+        problem.prior_information[(at, at)] = 1.0;
+        problem.keyframes[1].pose.x += 0.2;
+        assert!(!problem.carry_landmarks(&before) && problem.landmarks[0] == LANDMARK);
+    }
 }
