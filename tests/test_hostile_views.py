@@ -88,7 +88,9 @@ def test_no_method_is_sure_of_noise(stripes: Panorama) -> None:
 def test_edges_of_the_pixel_grid_are_no_verticals(stripes: Panorama) -> None:
     cases = ("ahead", "ahead, boxes drawn", "ahead, last row repeated")
     table = judge_images(hostile_images([stripes], count=12, cases=cases))
-    counts = summarise_cases(table).filter(pl.col("case").is_in(cases) & pl.col("method").is_in(["refined", "segments"]))
+    counts = summarise_cases(table).filter(
+        pl.col("case").is_in(cases) & pl.col("method").is_in(["refined", "segments"])
+    )
     assert counts["wrong_and_sure"].max() == 0.0
     right = counts.filter(method="segments")["right"].to_list()
     assert right == pytest.approx([100.0, 100.0, 100.0], abs=20.0)
