@@ -118,12 +118,21 @@ impl BundleProblem {
 
     /// Levenberg-Marquardt until the cost falls by less than `tolerance`, or would: beside a kink of a robust loss a step that
     /// is predicted to gain less may lead up.
-    pub(crate) fn levenberg_marquardt(
+    pub(crate) fn levenberg_marquardt(&mut self, max_iterations: u32, tolerance: f64, damping: f64) -> DescentReport {
+        self.descend(max_iterations, tolerance, damping, false)
+    }
+
+    /// The same where the anchors of landmarks may be moved: not in a sliding window, whose prior is about them.
+    pub(crate) fn levenberg_marquardt_carrying(
         &mut self,
         max_iterations: u32,
         tolerance: f64,
-        mut damping: f64,
+        damping: f64,
     ) -> DescentReport {
+        self.descend(max_iterations, tolerance, damping, true)
+    }
+
+    fn descend(&mut self, max_iterations: u32, tolerance: f64, mut damping: f64, carrying: bool) -> DescentReport {
         let mut cost = self.cost();
         let mut iterations = 0;
         while iterations < max_iterations {
@@ -136,7 +145,7 @@ impl BundleProblem {
             let at_minimum = moved.is_some_and(|predicted| predicted < tolerance) && damping < CONVERGED_DAMPING;
             let is_lower = |next: &f64| next.is_finite() && *next <= cost + ROUNDING * cost;
             let fixed = moved.map(|_| self.cost()).filter(is_lower);
-            let carried = fixed.is_none() && moved.is_some() && self.carry_landmarks(&before);
+            let carried = carrying && fixed.is_none() && moved.is_some() && self.carry_landmarks(&before);
             let lower = fixed.or_else(|| carried.then(|| self.cost()).filter(is_lower));
             if let Some(next) = lower {
                 let small_gain = cost - next < tolerance && damping < CONVERGED_DAMPING;

@@ -78,7 +78,7 @@ pub(super) fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProb
         }
     };
     if asked != with_wheels {
-        named.problem.levenberg_marquardt(options.max_iterations, TOLERANCE, FIRST_DAMPING);
+        named.problem.levenberg_marquardt_carrying(options.max_iterations, TOLERANCE, FIRST_DAMPING);
         named.problem = named.problem.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
     }
     Ok(named)

@@ -16,7 +16,7 @@ pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> Descent
     problem.slip = MotionLoss::Logarithmic;
     let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
         problem.loss = loss;
-        problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
+        problem.levenberg_marquardt_carrying(max_iterations, TOLERANCE, FIRST_DAMPING)
     };
     let losses = [ROBUST_LOSS, BearingLoss::Truncated(OUTLIER_SIGMAS)];
     let [robust, mut last] = losses.map(|loss| descend(problem, loss));
@@ -48,5 +48,5 @@ pub(super) fn solve_without_slips(problem: &mut BundleProblem, max_iterations: u
         return None;
     }
     problem.slip = MotionLoss::Redescending;
-    Some(problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING))
+    Some(problem.levenberg_marquardt_carrying(max_iterations, TOLERANCE, FIRST_DAMPING))
 }

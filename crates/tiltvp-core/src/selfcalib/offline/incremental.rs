@@ -147,7 +147,7 @@ impl<'a> IncrementalProblem<'a> {
 
     fn solve(&mut self) {
         self.problem.reanchor();
-        self.problem.levenberg_marquardt(STAGE_ITERATIONS, STAGE_TOLERANCE, FIRST_DAMPING);
+        self.problem.levenberg_marquardt_carrying(STAGE_ITERATIONS, STAGE_TOLERANCE, FIRST_DAMPING);
     }
 
     /// Adds the motion of a step; nothing happens at a standstill, until what it tells adds up to a motion.
