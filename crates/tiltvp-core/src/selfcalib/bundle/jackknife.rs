@@ -71,7 +71,7 @@ impl BundleProblem {
         let solved = |part: &Range<usize>| {
             let mut problem = self.clone();
             problem.doubt(part.clone());
-            let descent = problem.levenberg_marquardt(ITERATIONS, TOLERANCE, FIRST_DAMPING);
+            let descent = problem.levenberg_marquardt_carrying(ITERATIONS, TOLERANCE, FIRST_DAMPING);
             let slips: f64 = part.clone().filter(|to| self.slipped(*to)).map(|to| self.motion_cost(to)).sum();
             Some((self.moved(&problem, &descent)?, cost - descent.cost - slips))
         };
