@@ -6,8 +6,8 @@ use super::work::Work;
 use crate::edges::{EdgePixels, Region, StepMap, is_grid_step};
 use crate::image::ImageView;
 
-/// Share of the edge pixels that agree from which on the others are asked: of 41 views that are not harmed none upward has as many, one ahead by
-/// a pinhole camera, and of what was made small without blur 16 by a fisheye ahead and 29 panoramas.
+/// Share of the edge pixels that agree from which on the others are asked. Of 41 views each that are not harmed none upward has as many, and one
+/// ahead by a pinhole camera; of what was made small without blur 16 by a fisheye ahead have, and 29 panoramas.
 const SHARE_MIN: f64 = 0.15;
 
 /// Rows that are looked at, or up to twice as many: where half agree the share of these errs by 0.02 or less.

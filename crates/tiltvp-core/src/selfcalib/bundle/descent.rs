@@ -65,8 +65,8 @@ impl BundleProblem {
         self.keyframes.iter().map(|keyframe| keyframe.pose).collect()
     }
 
-    /// Moves the anchors of landmarks with the poses that first see them, and their steps to what is left: the step changes their places in the
-    /// frames of these poses as it does to first order. From a fixed anchor the step of a landmark that goes with a pose by decimetres
+    /// Moves the anchors of landmarks with the poses that first see them, and their steps to what is left: the step changes their places in
+    /// the frames of these poses as it does to first order. From a fixed anchor the step of a landmark that goes with a pose by decimetres
     /// errs by its square, in all of its bearings. Does nothing, and says so, where the prior knows the direction of a landmark.
     fn carry_landmarks(&mut self, before: &SavedValues) -> bool {
         let free = self.free.width();
