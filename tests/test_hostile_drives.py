@@ -316,3 +316,21 @@ def test_the_table_counts_as_it_says() -> None:
     assert refused["named"].to_list() == [None, None]
     assert refused["answered"].to_list() == [False, False]
     assert main(["measure", "trust-calibration", "--only", "no such case"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("factor", "base", "told"),
+    [
+        (1e3, "0.4", "105 of 105 motions are of more than half a turn or 20 m: are displacements in millimetres"),
+        (1.0, "170", "wheels 170 m apart: is the wheel base in centimetres or millimetres?"),
+        (1.0, "0.4", ""),
+    ],
+)
+def test_lengths_of_no_robot_are_doubted(factor: float, base: str, told: str, tmp_path: Path) -> None:
+    """Of a drive straight on, whose scale nothing but its lengths tells."""
+    drive, out = simulate_drive("straight", seed=3), tmp_path / "out.json"
+    hostile = replace(one(UNDISTURBED), odometry=factor * drive.odometry, bearings=drive.bearings)
+    assert main([*write(tmp_path, hostile)[:-1], base, "--out", str(out)]) == 1
+    doubt = json.loads(out.read_text())["logs"][0]["doubt"]
+    assert doubt.startswith(told)
+    assert bool(doubt) is bool(told)

@@ -154,4 +154,5 @@ def _calibrated(
             send_calibration(viewer, log, history, whole)
     for word in remedies:
         say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
+    doubt = "; ".join(filter(None, (doubt, drive.odd_units(log, remedies))))
     return Calibration(one.name, calibrator, history, whole, doubt, one.late_s)

@@ -37,6 +37,8 @@ _REMEDIES = {
 """What may mend a log that was misread, where it has another name."""
 _FORMS: Final = "ODOMETRY.csv BEARINGS.csv, or the pictures of a drive with --camera FILE"
 _TABLE: Final = ".csv"
+_WIDEST_M: Final = 10.0
+"""Wheels that are farther apart are those of a crane: the widest haul trucks are 9.9 m wide in all."""
 
 
 @Parameter(name="*", group=Group("Drive"))
@@ -71,6 +73,15 @@ class DriveOptions(LibraryOptions):
     def start_known(self) -> tuple[float, float, float]:
         """The mounting as it is thought to be."""
         return self.start or (0.0, 0.0, 0.0)
+
+    def odd_units(self, log: DriveLog, remedies: Sequence[str]) -> str:
+        """What lengths seem to be told in other units than metres, where no reading is known that mends a log."""
+        from tiltvp.drive_logs import far_steps
+
+        assert self.wheel_base is not None  # As `settled` has it.
+        if self.wheel_base > _WIDEST_M:
+            return f"wheels {self.wheel_base:g} m apart: is the wheel base in centimetres or millimetres?"
+        return "" if remedies else far_steps(log.odometry, self.wheel_base)
 
     def of_filter(self) -> dict[str, Any]:
         """What `SelfCalibrator` takes."""
