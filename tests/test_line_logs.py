@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import json
 import re
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -174,3 +175,24 @@ def test_lines_are_followed_from_where_a_robots_file_has_the_camera(folder: Path
         assert main(["track", str(folder / "images"), *words, *odometry, "--out", str(out)]) == 0
         tables.append(out.read_text())
     assert tables[0] == tables[1] != tables[2]
+
+
+def test_images_of_a_frozen_camera_are_left_out_and_named(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    images, out, tracks = tmp_path / "images", tmp_path / "found.json", tmp_path / "tracks.csv"
+    shutil.copytree(folder / "images", images)
+    files = sorted(images.iterdir())
+    for k in (3, 4):
+        shutil.copy(files[2], files[k])
+    words = ["--camera", f"{folder}/camera.toml", "--odometry", f"{folder}/odometry.csv", "--wheel-base", "0.35"]
+    assert main(["track", str(images), *words, "--out", str(tracks)]) == 0
+    assert {3, 4}.isdisjoint(pl.read_csv(tracks)["frame"])
+    told = "2 left out that are the same as the one before while the robot moved"
+    assert told in capsys.readouterr().out
+    main(["calibrate", str(images), *words, "--out", str(out)])
+    told = f"2 of {len(files)} images left out, the same as the one before to the last bit while the robot moved"
+    (log,) = json.loads(out.read_text())["logs"]
+    assert told in log["reason"]
+    assert log["doubt"] == ""
+    assert told in " ".join(capsys.readouterr().out.split())

@@ -144,7 +144,7 @@ def _calibrated(
             **{"estimate_centre": read.estimate_centre} | noise() | options | drive.of_whole_log(),
         )  # fmt: skip
 
-    log, whole, doubt, remedies = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
+    log, whole, doubt, remedies, left_out = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
         # The filter does not estimate the image centre.
@@ -155,4 +155,4 @@ def _calibrated(
     for word in remedies:
         say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
     doubt = "; ".join(filter(None, (doubt, drive.odd_units(log, remedies))))
-    return Calibration(one.name, calibrator, history, whole, doubt, one.late_s)
+    return Calibration(one.name, calibrator, history, whole, doubt, one.late_s, left_out)

@@ -125,6 +125,8 @@ class Solved(NamedTuple):
     """Why the mounting cannot be relied upon, beside what it says itself."""
     remedies: tuple[str, ...] = ()
     """Words of `--read-as` to try."""
+    left_out: str = ""
+    """How many images were left out of it, and why; empty: none."""
 
 
 @dataclass(frozen=True)

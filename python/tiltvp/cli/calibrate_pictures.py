@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PictureLog", "PictureOptions"]
 
+_FROZEN: Final = "left out, the same as the one before to the last bit while the robot moved: a frozen camera?"
 _SAME_DEG: Final = 1e-3
 """Turns that differ by less, as by their digits in a table, are the wheels' own."""
 
@@ -76,6 +77,8 @@ class PictureLog:
     """Images that could not be read."""
     late_s: float = 0.0
     """What was taken from the times of the frames, to bring them to the odometry's clock."""
+    left_out: str = ""
+    """How many images a frozen camera gave, once there is a log; empty: none."""
 
     @property
     def name(self) -> str:
@@ -161,7 +164,7 @@ class PictureLog:
                     start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
                 )  # fmt: skip
         except InvalidInputError as error:
-            raise InvalidInputError(f"{self.name}: {error}") from error
+            raise InvalidInputError("; ".join(filter(None, (f"{self.name}: {error}", self.left_out)))) from error
         if self.pictures.tracks is not None:
             rows = zip(named, found.frames, strict=True)
             table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
@@ -172,7 +175,7 @@ class PictureLog:
         doubt = "; ".join(filter(None, (moved.doubt, found.doubt)))
         # Bearings of images are not written down: only what is said of the wheels can be.
         remedies = tuple(word for word in other_readings(found.misreading) if word != "clockwise")
-        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt, remedies)
+        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt, remedies, self.left_out)
 
     def _seen(
         self, rotation: NDArray[np.float64]
@@ -185,10 +188,13 @@ class PictureLog:
         with ending_at_interrupt(self.frames) as coming, progress_bar(count, f"{self.name}: lines") as bar:
             seen = [((frame.name, frame.time_s), replace(one, gray=nothing)) for frame, one in drive.seen(coming, bar)]
         self.bad = drive.bad
-        if drive.leaning:
+        if drive.told():
             say(f"{self.name}: of {counted(count, 'frames')} {drive.told()}")
+        if drive.repeated:
+            self.left_out = f"{drive.repeated} of {counted(count, 'images')} {_FROZEN}"
         if not seen:
-            raise InvalidInputError(f"{self.name}: no line is seen in {counted(count, 'frames')}, {drive.told()}")
+            left_out = f", {drive.told()}" if drive.told() else ""
+            raise InvalidInputError(f"{self.name}: no line is seen in {counted(count, 'frames')}{left_out}")
         named, lines = zip(*seen, strict=True)
         return named, lines
 

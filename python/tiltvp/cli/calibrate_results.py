@@ -37,6 +37,8 @@ class Calibration:
     """Why the whole log's answer cannot be relied upon, beside what it says itself."""
     late_s: float = 0.0
     """What was taken from the times of frames before; the whole log's time offset is what is left of it."""
+    left_out: str = ""
+    """How many images were left out of the log, and why; empty: none."""
 
     @property
     def frames_late_s(self) -> float | None:
@@ -48,8 +50,8 @@ class Calibration:
 
     @property
     def reason(self) -> str:
-        """Whether the whole log's answer can be relied upon, and why not, in a sentence."""
-        return "; ".join(filter(None, (self.doubt, self.whole.reason)))
+        """Whether the whole log's answer can be relied upon, and why not, and what was left out, in a sentence."""
+        return "; ".join(filter(None, (self.doubt, self.whole.reason, self.left_out)))
 
 
 @Parameter(name="*", group=Group("Results"))
@@ -195,6 +197,7 @@ def _plain_log(one: Calibration) -> dict[str, object]:
         "name": one.name,
         "whole_log": one.whole.to_dict(),
         "doubt": one.doubt,
+        "reason": one.reason,
         "frames_late_s": one.frames_late_s,
         "filter": one.calibrator.estimate.to_dict(),
         "options": {name: _plain(value) for name, value in one.calibrator.options.items()},

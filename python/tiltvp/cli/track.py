@@ -107,8 +107,8 @@ def track(
     if film is not None and film.note is not None:
         complain(f"{video}: {film.note}")
     if not tracked:
-        count = drive.bad + drive.leaning
-        which = "none of which can be read" if not drive.leaning else f"{drive.told()}, and no other can be read"
+        count = drive.bad + drive.leaning + drive.repeated
+        which = f"{drive.told()}, and no other can be read" if drive.told() else "none of which can be read"
         raise InvalidInputError(f"{frames.source}: {counted(count, 'frames')}, {which}")
     table = track_table(tracked)
     write_table(table, out)
@@ -118,9 +118,10 @@ def track(
         from tiltvp.lab.plots.tracks import track_plot
 
         write_image(plot, figure_picture(track_plot(table.frame())))
-    skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
+    skipped = f"{drive.bad} skipped" if drive.bad else ""
     lines, tracks = counted(len(table.rows), "lines"), counted(tracker.track_count, "tracks")
-    say(f"{out}: {counted(len(tracked), 'frames')}{skipped}, {lines}, {tracks}")
+    parts = filter(None, (counted(len(tracked), "frames"), skipped, drive.told(), lines, tracks))
+    say(f"{out}: {', '.join(parts)}")
     tell_jumps(str(out), [(name, lines) for _, name, _, lines in tracked])
     return 1 if drive.bad or frames.problems else 0
 
@@ -188,6 +189,8 @@ class Drive:
         """How many frames could not be used so far."""
         self.leaning = 0
         """How many were left out so far because their lean is not known."""
+        self.repeated = 0
+        """How many were left out so far that are the same as the one before although the robot moved."""
 
     @property
     def robot_from_camera(self) -> NDArray[np.float64]:
@@ -195,15 +198,19 @@ class Drive:
         return self._parts[0].robot_from_camera
 
     def told(self) -> str:
-        """How many frames were left out because of their lean."""
-        return f"{self.leaning} left out whose lean is not known"
+        """How many frames were left out because of their lean, and because they repeat the one before; empty: none."""
+        leaning = f"{self.leaning} left out whose lean is not known" if self.leaning else ""
+        repeated = f"{self.repeated} left out that are the same as the one before while the robot moved"
+        return ", ".join(filter(None, (leaning, repeated if self.repeated else "")))
 
     def seen(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, SeenFrame]]:
         """The frames that can be used, with their lines; the others are complained about.
 
-        Frames whose lean is not known are left out and counted. So are those of whose time the odometry does not tell;
-        a line about them has been told before.
+        Frames whose lean is not known are left out and counted, and those of a frozen camera. So are those of whose
+        time the odometry does not tell; a line about them has been told before.
         """
+        import numpy as np
+
         from tiltvp.line_logs import see_lines
         from tiltvp.streams import Motion
 
@@ -212,15 +219,29 @@ class Drive:
         passed: list[Frame] = []
 
         def images() -> Iterator[NDArray[np.uint8] | TiltvpError]:
+            before, moved = None, 0.0
             for number, frame in enumerate(frames):
                 passed.append(frame)
-                yield _LEFT_OUT if motions is not None and motions[number] is None else frame.image
+                motion = Motion() if motions is None else motions[number]
+                if motion is None:
+                    yield _LEFT_OUT
+                    continue
+                image, moved = frame.image, moved + abs(motion.distance_m) + abs(motion.yaw_rad)
+                if isinstance(image, TiltvpError):
+                    yield image
+                elif moved > _STILL and before is not None and np.array_equal(image, before):
+                    yield _REPEATED
+                else:
+                    before, moved = image, 0.0
+                    yield image
 
         driven = None if motions is None else [motion or Motion() for motion in motions]
         for seen in see_lines(images(), extractor, tilt=tilt, motions=driven):
             frame = passed.pop()
             if isinstance(seen, UnknownLeanError):
                 self.leaning += 1
+            elif seen is _REPEATED:
+                self.repeated += 1
             elif seen is not _LEFT_OUT:
                 if isinstance(seen, TiltvpError):
                     bar.complain(named(frame.name, str(seen)))
@@ -231,6 +252,9 @@ class Drive:
 
 
 _LEFT_OUT: Final = TiltvpError("the odometry does not tell of its time")
+_REPEATED: Final = TiltvpError("the same as the one before while the robot moved")
+_STILL: Final = 0.01
+"""Metres and radians in all by which a robot that stands seems to move, as `TiltFilter` has it of wheels."""
 
 
 def track_table(tracked: Sequence[Seen]) -> Table:
