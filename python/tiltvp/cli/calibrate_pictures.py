@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PictureLog", "PictureOptions"]
 
-_FROZEN: Final = "left out, the same as the one before to the last bit while the robot moved: a frozen camera?"
 _SAME_DEG: Final = 1e-3
 """Turns that differ by less, as by their digits in a table, are the wheels' own."""
 
@@ -191,7 +190,7 @@ class PictureLog:
         if drive.told():
             say(f"{self.name}: of {counted(count, 'frames')} {drive.told()}")
         if drive.repeated:
-            self.left_out = f"{drive.repeated} of {counted(count, 'images')} {_FROZEN}"
+            self.left_out = f"of {counted(count, 'images')} {drive.frozen()}"
         if not seen:
             left_out = f", {drive.told()}" if drive.told() else ""
             raise InvalidInputError(f"{self.name}: no line is seen in {counted(count, 'frames')}{left_out}")

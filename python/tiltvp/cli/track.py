@@ -198,10 +198,14 @@ class Drive:
         return self._parts[0].robot_from_camera
 
     def told(self) -> str:
-        """How many frames were left out because of their lean, and because they repeat the one before; empty: none."""
+        """How many frames were left out because of their lean, and as of a frozen camera; empty: none."""
         leaning = f"{self.leaning} left out whose lean is not known" if self.leaning else ""
-        repeated = f"{self.repeated} left out that are the same as the one before while the robot moved"
-        return ", ".join(filter(None, (leaning, repeated if self.repeated else "")))
+        return ", ".join(filter(None, (leaning, self.frozen())))
+
+    def frozen(self) -> str:
+        """How many frames were left out as of a frozen camera; empty: none."""
+        which = "left out as of a frozen camera (the same as the one before while the robot moved)"
+        return f"{self.repeated} {which}" if self.repeated else ""
 
     def seen(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, SeenFrame]]:
         """The frames that can be used, with their lines; the others are complained about.
@@ -229,11 +233,11 @@ class Drive:
                 image, moved = frame.image, moved + abs(motion.distance_m) + abs(motion.yaw_rad)
                 if isinstance(image, TiltvpError):
                     yield image
-                elif moved > _STILL and before is not None and np.array_equal(image, before):
-                    yield _REPEATED
-                else:
+                    continue
+                same = before is not None and np.array_equal(image, before)
+                if not same:
                     before, moved = image, 0.0
-                    yield image
+                yield _REPEATED if same and moved > _STILL else image
 
         driven = None if motions is None else [motion or Motion() for motion in motions]
         for seen in see_lines(images(), extractor, tilt=tilt, motions=driven):
