@@ -6,7 +6,7 @@ use super::cholesky::CholeskyFactor;
 use super::problem::BundleProblem;
 use super::schur::ReducedSystem;
 use crate::interrupt::check;
-use crate::selfcalib::model::{FitSummary, InverseDistanceLandmark, between, compose};
+use crate::selfcalib::model::{FitSummary, InverseDistanceLandmark, between, between_jacobians, compose};
 
 /// Damping, as a share of the normal equations' diagonal, with which Levenberg-Marquardt starts where little is known: small
 /// against every parameter that the drive determines, large against those that it does not.
@@ -23,6 +23,10 @@ const MOST_DAMPING: f64 = 1e9;
 
 /// Damping from which on a small gain does not mean convergence: the step is short because of the damping.
 const CONVERGED_DAMPING: f64 = 1e-2;
+
+/// What an undamped step may be predicted to gain where a descent that makes no way has converged: the rise of the cost at one standard
+/// deviation. Beside a kink of a robust loss, and where one slip after another loses its weight, there is less to gain than is predicted.
+const PROMISED_MOST: f64 = 0.5;
 
 /// Relative difference of two costs that may be rounding of sums over some ten thousand residuals.
 const ROUNDING: f64 = 1e-9;
@@ -65,18 +69,32 @@ impl BundleProblem {
         self.keyframes.iter().map(|keyframe| keyframe.pose).collect()
     }
 
-    /// Moves the anchors of landmarks with the poses that first see them, and their steps to what is left: the step changes their places in
-    /// the frames of these poses as it does to first order. From a fixed anchor the step of a landmark that goes with a pose by decimetres
-    /// errs by its square, in all of its bearings. Does nothing, and says so, where the prior knows the direction of a landmark.
-    fn carry_landmarks(&mut self, before: &SavedValues) -> bool {
+    /// Takes the step of the poses as one of the motions between them. Where the far end of a long way moves by decimetres, poses that step
+    /// straight stretch each motion by the square of how far they turn.
+    fn recompose_poses(&mut self, before: &[Vector3<f64>], straight: &[Vector3<f64>]) {
+        for at in 1..straight.len() {
+            let [(old_start, start), (old_end, end)] = [at - 1, at].map(|at| (&before[at], &straight[at]));
+            let motion = between(old_start, old_end);
+            let (by_start, by_end) = between_jacobians(old_start, &motion);
+            let motion = motion + by_start * (start - old_start) + by_end * (end - old_end);
+            self.keyframes[at].pose = compose(&self.keyframes[at - 1].pose, &motion);
+        }
+    }
+
+    /// Takes the step again as one of the motions between poses, and of landmarks in the frames of the poses that first see them, whose anchors
+    /// it moves with these: to first order it is the same. From a fixed anchor the step of a landmark that goes with a pose by decimetres errs
+    /// by its square, in all of its bearings. Does nothing, and says so, where the prior knows the direction of a landmark.
+    fn take_relative_step(&mut self, before: &SavedValues) -> bool {
         let free = self.free.width();
         let knows = |i: usize| self.prior_information[(free + 2 * i, free + 2 * i)] > 0.0;
         if (0..self.landmarks.len()).any(knows) {
             return false;
         }
+        let straight = self.poses();
+        self.recompose_poses(&before.poses, &straight);
         let mut carried = vec![false; self.landmarks.len()];
-        for (keyframe, old_pose) in self.keyframes.iter().zip(&before.poses) {
-            let step = keyframe.pose - old_pose;
+        for ((keyframe, old_pose), straight) in self.keyframes.iter().zip(&before.poses).zip(&straight) {
+            let step = straight - old_pose;
             for seen in &keyframe.observations {
                 if std::mem::replace(&mut carried[seen.landmark], true) {
                     continue;
@@ -89,7 +107,7 @@ impl BundleProblem {
                 let anchor = Vector3::new(old.anchor.x, old.anchor.y, 0.0);
                 let landmark = &mut self.landmarks[seen.landmark];
                 landmark.anchor = compose(&keyframe.pose, &between(old_pose, &anchor)).xy();
-                landmark.direction += step.z - point.along.perp(&moved);
+                landmark.direction += keyframe.pose.z - old_pose.z - point.along.perp(&moved);
                 landmark.log_inverse_distance += point.along.dot(&moved);
             }
         }
@@ -135,6 +153,8 @@ impl BundleProblem {
     fn descend(&mut self, max_iterations: u32, tolerance: f64, mut damping: f64, carrying: bool) -> DescentReport {
         let mut cost = self.cost();
         let mut iterations = 0;
+        // What the last undamped step was predicted to gain, if no step has gained much since.
+        let mut promised = None;
         while iterations < max_iterations {
             iterations += 1;
             check();
@@ -142,29 +162,37 @@ impl BundleProblem {
             let last = self.keyframes.len() - 1;
             let system = self.eliminate_poses(last, false, damping);
             let moved = system.and_then(|system| Some(system.predicted_reduction + self.take_step(&system)?));
-            let at_minimum = moved.is_some_and(|predicted| predicted < tolerance) && damping < CONVERGED_DAMPING;
             let is_lower = |next: &f64| next.is_finite() && *next <= cost + ROUNDING * cost;
             let fixed = moved.map(|_| self.cost()).filter(is_lower);
-            let carried = carrying && fixed.is_none() && moved.is_some() && self.carry_landmarks(&before);
+            let carried = carrying && fixed.is_none() && moved.is_some() && self.take_relative_step(&before);
             let lower = fixed.or_else(|| carried.then(|| self.cost()).filter(is_lower));
+            let gain = lower.map(|next| cost - next);
             if let Some(next) = lower {
-                let small_gain = cost - next < tolerance && damping < CONVERGED_DAMPING;
                 cost = next;
-                if small_gain || at_minimum {
-                    return DescentReport { iterations, converged: true, cost };
-                }
-                damping = if damping < LEAST_DAMPING { 0.0 } else { 0.1 * damping };
-            } else {
-                if moved.is_some() {
-                    self.restore(&before);
-                }
-                if at_minimum {
-                    return DescentReport { iterations, converged: true, cost };
-                }
-                damping = if damping == 0.0 { SMALL_DAMPING } else { 10.0 * damping };
-                if damping > MOST_DAMPING {
-                    break;
-                }
+            } else if moved.is_some() {
+                self.restore(&before);
+            }
+            if damping == 0.0 {
+                promised = moved;
+            }
+            let is_small = |gain: Option<f64>| gain.is_some_and(|gain| gain < tolerance);
+            let rests = damping < CONVERGED_DAMPING && (is_small(moved) || is_small(gain));
+            if rests && (promised.is_some() || !carrying) {
+                let converged = !carrying || promised.is_some_and(|gain| gain < PROMISED_MOST);
+                return DescentReport { iterations, converged, cost };
+            }
+            if lower.is_some() {
+                promised = None;
+            }
+            damping = match lower {
+                _ if rests => 0.0,
+                Some(_) if damping < LEAST_DAMPING => 0.0,
+                Some(_) => 0.1 * damping,
+                None if damping == 0.0 => SMALL_DAMPING,
+                None => 10.0 * damping,
+            };
+            if damping > MOST_DAMPING {
+                break;
             }
         }
         DescentReport { iterations, converged: false, cost }
@@ -263,10 +291,24 @@ mod tests {
         let in_frame = |problem: &BundleProblem| between(&problem.keyframes[1].pose, &point(&problem.landmarks[0]));
         let expected = between(&pose, &point(&LANDMARK)).xy();
         assert!((in_frame(&problem).xy() - expected).norm() > 1e-3);
-        assert!(problem.carry_landmarks(&before));
+        assert!(problem.take_relative_step(&before));
         assert!((in_frame(&problem).xy() - expected).norm() < 1e-12);
         problem.restore(&before);
         assert!(problem.landmarks[0] == LANDMARK && problem.keyframes[1].pose == pose);
+    }
+
+    #[test]
+    fn a_way_that_turns_as_a_whole_is_not_stretched() {
+        let mut problem = problem();
+        let poses: Vec<_> =
+            (0..5).map(|k| Vector3::new(f64::from(k), 0.1 * f64::from(k * k), 0.2 * f64::from(k))).collect();
+        let turned: Vec<_> = poses.iter().map(|p| p + 0.1 * Vector3::new(-p.y, p.x, 1.0)).collect();
+        problem.keyframes = turned.iter().map(|pose| Keyframe { pose: *pose, ..Keyframe::anchor() }).collect();
+        problem.recompose_poses(&poses, &turned);
+        for at in 1..poses.len() {
+            let [old, straight, new] = [&poses, &turned, &problem.poses()].map(|way| between(&way[at - 1], &way[at]));
+            assert!((straight - old).norm() > 1e-3 && (new - old).norm() < 1e-12, "{straight} {new} {old}");
+        }
     }
 
     #[test]
@@ -276,6 +318,6 @@ mod tests {
         let at = problem.free.width();
         problem.prior_information[(at, at)] = 1.0;
         problem.keyframes[1].pose.x += 0.2;
-        assert!(!problem.carry_landmarks(&before) && problem.landmarks[0] == LANDMARK);
+        assert!(!problem.take_relative_step(&before) && problem.landmarks[0] == LANDMARK);
     }
 }

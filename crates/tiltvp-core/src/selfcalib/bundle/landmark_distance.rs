@@ -1,4 +1,4 @@
-//! Landmarks at wrong distances: a new anchor, and a line search over the distance.
+//! Landmarks at wrong distances: a new anchor, a line search over the distance, and a prior that knows nothing of it.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -14,7 +14,16 @@ pub(crate) const DISTANCE_STEPS: i32 = 8;
 /// A landmark nearer to its new anchor than this, metres, keeps the old one: its direction from there would be noise.
 const LEAST_DISTANCE_M: f64 = 1e-6;
 
+/// Standard deviation of the logarithm of a distance of which nothing is known.
+pub(crate) const UNKNOWN_LOG_SIGMA: f64 = 100.0;
+
 impl BundleProblem {
+    /// Makes the prior know nothing of the distance of a landmark.
+    pub(crate) fn forget_distance(&mut self, landmark: usize) {
+        let at = self.free.width() + 2 * landmark + 1;
+        self.prior_information[(at, at)] = 1.0 / (UNKNOWN_LOG_SIGMA * UNKNOWN_LOG_SIGMA);
+    }
+
     /// Moves the anchor of every landmark to the place of the camera at its first observation. From another anchor a landmark
     /// may have to pass through that anchor to reach its true place. Landmarks whose direction the prior knows stay.
     pub(crate) fn reanchor(&mut self) {

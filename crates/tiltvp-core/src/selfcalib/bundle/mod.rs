@@ -21,6 +21,6 @@ pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
 pub(super) use self::free_parameters::FreeParameters;
 pub(super) use self::jackknife::DoubtedParts;
 pub(super) use self::keyframe::{Keyframe, Observation};
-pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};
+pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS, UNKNOWN_LOG_SIGMA};
 pub(super) use self::problem::BundleProblem;
 pub(super) use self::schur::ReducedSystem;

@@ -56,7 +56,9 @@ impl BundleProblem {
 
     /// Whether the mountings before and after a jump are clearly rather the same than changed by a bump.
     fn is_slip(&self, options: &SelfCalibratorOptions, to: usize, bump: &Vector3<f64>) -> bool {
-        let Some((early, late)) = self.before(to).mounting_alone().zip(self.from(to, options).mounting_alone()) else {
+        let Some((early, late)) =
+            self.before(to, options).mounting_alone().zip(self.from(to, options).mounting_alone())
+        else {
             return false;
         };
         let mut off = late.0 - early.0;
@@ -67,10 +69,10 @@ impl BundleProblem {
     }
 
     /// The part of the log before a keyframe.
-    fn before(&self, to: usize) -> Self {
+    fn before(&self, to: usize, options: &SelfCalibratorOptions) -> Self {
         let mut part = self.clone();
         part.keyframes.truncate(to);
-        part.hold_landmarks();
+        part.hold_landmarks(options);
         part
     }
 
@@ -79,26 +81,25 @@ impl BundleProblem {
         let mut part = self.clone();
         part.keyframes.drain(..to);
         let width = part.width();
-        let mut fresh = Self::new(options, &part.mounting, part.free, part.loss).prior_information;
-        let calibration = fresh.nrows();
-        fresh = fresh.resize(width, width, 0.0);
-        let sigma = options.start_distance_log_sigma;
-        for at in (calibration + 1..width).step_by(2) {
-            fresh[(at, at)] = 1.0 / (sigma * sigma);
-        }
-        part.prior_information = fresh;
+        let fresh = Self::new(options, &part.mounting, part.free, part.loss).prior_information;
+        part.prior_information = fresh.resize(width, width, 0.0);
         part.prior_mean = part.shared();
         part.prior_mean.fixed_rows_mut::<3>(0).copy_from(&options.start.vector());
-        part.hold_landmarks();
+        part.hold_landmarks(options);
         part
     }
 
-    /// Holds the directions of landmarks of which nothing but bearings would tell them. What is known of others stays as it is.
-    fn hold_landmarks(&mut self) {
-        for at in (self.free.width()..self.width()).step_by(2) {
-            if self.prior_information[(at, at)] == 0.0 {
-                self.prior_information[(at, at)] = UNSEEN_INFORMATION;
-                self.prior_mean[at] = self.landmarks[(at - self.free.width()) / 2].direction;
+    /// Holds landmarks of which nothing but bearings would tell the direction, or the distance. What is known of others stays as it is.
+    fn hold_landmarks(&mut self, options: &SelfCalibratorOptions) {
+        let (here, sigma) = (self.shared(), options.start_distance_log_sigma);
+        let start = 1.0 / (sigma * sigma);
+        for direction in (self.free.width()..self.width()).step_by(2) {
+            let held = [(direction, f64::MIN_POSITIVE, UNSEEN_INFORMATION), (direction + 1, start, start)];
+            for (at, least, information) in held {
+                if self.prior_information[(at, at)] < least {
+                    self.prior_information[(at, at)] = information;
+                    self.prior_mean[at] = here[at];
+                }
             }
         }
     }

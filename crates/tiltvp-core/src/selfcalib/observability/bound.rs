@@ -3,14 +3,13 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::error::{Error, Result};
-use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, FreeParameters, Keyframe, Observation};
+use crate::selfcalib::bundle::{
+    BundleProblem, CholeskyFactor, FreeParameters, Keyframe, Observation, UNKNOWN_LOG_SIGMA,
+};
 use crate::selfcalib::model::{
     BearingLoss, InverseDistanceLandmark, MotionLoss, Mounting, RelativeMotion, WheelMotion, camera_position,
 };
 use crate::selfcalib::options::SelfCalibratorOptions;
-
-/// Standard deviation of the logarithm of a landmark's distance: so large that the bound does not know the distance.
-const UNKNOWN_LOG_SIGMA: f64 = 100.0;
 
 /// The smallest covariance of (x, y, yaw) that an unbiased estimator can have if the places of the landmarks are unknown. The
 /// information at the start is included.

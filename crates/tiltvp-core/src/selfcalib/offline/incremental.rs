@@ -11,11 +11,13 @@ use crate::interrupt::check;
 use crate::selfcalib::bundle::{BundleProblem, FIRST_DAMPING, FreeParameters, Keyframe, Observation};
 use crate::selfcalib::model::{BearingLoss, RelativeMotion, WheelMotion, compose};
 
-/// Keyframes after which the log so far is solved: a fifth of those that there are, at least 5, at most 50. A fifth makes the work
-/// of all stages six times that of the last. At most 50 keep the drift between stages below what a loop closure can mend.
+/// Keyframes after which the log so far is solved: a fifth of those that there are, at least 5, at most 50, but in a long log a fortieth.
+/// A fifth makes the work of all stages six times that of the last. At most 50 keep the drift between stages below what a loop closure can
+/// mend, a fortieth the work of all stages below forty times that of the last.
 const STAGE_SHARE: usize = 5;
 const LEAST_STAGE: usize = 5;
 const MOST_STAGE: usize = 50;
+const LONG_STAGE_SHARE: usize = 40;
 
 /// Keyframes after which a landmark that is seen again counts as another one where loops are not closed: 2 m at 4 cm a step, in
 /// which odometry drifts little.
@@ -118,7 +120,7 @@ impl<'a> IncrementalProblem<'a> {
     fn add_log(&mut self, log: &SortedLog<'_>, solve: bool) {
         let mut solved = 1;
         for step in log.steps() {
-            let stage = (solved / STAGE_SHARE).clamp(LEAST_STAGE, MOST_STAGE);
+            let stage = (solved / STAGE_SHARE).clamp(LEAST_STAGE, MOST_STAGE.max(solved / LONG_STAGE_SHARE));
             if solve && self.has_bearings && self.problem.keyframes.len() >= solved + stage {
                 self.initialise_landmarks(LEAST_OBSERVATIONS, PARALLAX_RAD);
                 self.solve();
@@ -138,6 +140,7 @@ impl<'a> IncrementalProblem<'a> {
     /// The problem with all landmarks.
     fn named(mut self) -> NamedProblem {
         self.initialise_landmarks(1, 0.0);
+        self.forget_start_distances();
         let mut names = vec![0; self.problem.landmarks.len()];
         for (name, (slot, _)) in self.initialised {
             names[slot] = name;
@@ -219,6 +222,22 @@ impl<'a> IncrementalProblem<'a> {
                 last = keyframe;
             }
             self.initialised.insert(id, (slot, last));
+        }
+    }
+
+    /// Leaves the distances of landmarks with parallax to their bearings. What is known of them at the start is about their anchors, which
+    /// stay where they were first seen: by it a map would hold to the place that it has, where all else leaves a long way free to bend.
+    fn forget_start_distances(&mut self) {
+        let mut seen = vec![Vec::new(); self.problem.landmarks.len()];
+        for (at, keyframe) in self.problem.keyframes.iter().enumerate() {
+            for observation in &keyframe.observations {
+                seen[observation.landmark].push((at, observation.bearing));
+            }
+        }
+        for (landmark, seen) in seen.iter().enumerate() {
+            if self.parallax(seen) >= PARALLAX_RAD {
+                self.problem.forget_distance(landmark);
+            }
         }
     }
 
