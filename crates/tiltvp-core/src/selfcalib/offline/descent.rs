@@ -1,7 +1,7 @@
 //! The descent of a whole log's problem: robustly, then without outliers, then with the scatters of the landmarks; and without slips.
 
 use super::incremental::ROBUST_LOSS;
-use crate::selfcalib::bundle::{BundleProblem, DescentReport, FIRST_DAMPING};
+use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters};
 use crate::selfcalib::model::{BearingLoss, MotionLoss, OUTLIER_SIGMAS};
 
 /// Fall of the cost below which a descent has converged: far below the 1/2 by which the cost rises at one standard deviation.
@@ -31,15 +31,34 @@ pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> Descent
         }
     }
     if problem.free.offset {
-        let mut other = problem.clone();
-        other.late = !problem.late;
-        let descent = descend(&mut other, losses[1]);
+        let descent = solve_other_side(problem, last, max_iterations);
         iterations += descent.iterations;
-        if descent.cost < last.cost {
-            (*problem, last) = (other, descent);
-        }
+        last = descent;
     }
     DescentReport { iterations, ..last }
+}
+
+/// Solves a problem with a free time offset, solved with late bearings or with early ones, with the others, and leaves the better solution.
+fn solve_other_side(problem: &mut BundleProblem, solved: DescentReport, max_iterations: u32) -> DescentReport {
+    let mut other = problem.clone();
+    other.late = !problem.late;
+    let descent = other.levenberg_marquardt_carrying(max_iterations, TOLERANCE, FIRST_DAMPING);
+    if descent.cost < solved.cost {
+        *problem = other;
+        return descent;
+    }
+    DescentReport { iterations: descent.iterations, ..solved }
+}
+
+/// The time offset of a solved problem where it is free, in its standard deviations.
+pub(super) fn time_offset_sigmas(solved: &BundleProblem, max_iterations: u32) -> Option<f64> {
+    let mut problem = solved.with_free(FreeParameters { offset: true, ..solved.free });
+    let descent = problem.levenberg_marquardt_carrying(max_iterations, TOLERANCE, FIRST_DAMPING);
+    solve_other_side(&mut problem, descent, max_iterations);
+    let system = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0)?;
+    let covariance = CholeskyFactor::regularised(&system.equations.information)?.inverse();
+    let at = problem.free.offset_at();
+    Some(problem.offset_s.abs() / covariance[(at, at)].sqrt())
 }
 
 /// Solves a problem that was solved again without the pull of motions that have slipped, if there are any.

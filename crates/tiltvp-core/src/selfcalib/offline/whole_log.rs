@@ -5,14 +5,14 @@ use std::fmt;
 use nalgebra::{DMatrix, Matrix3, Vector2};
 
 use super::attempts::{Attempt, solved, started};
-use super::descent::{solve, solve_without_slips};
+use super::descent::{solve, solve_without_slips, time_offset_sigmas};
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::merged_landmarks::take_apart;
 use super::misreading::Misreading;
 use super::noise::{solve_with_doubt, solve_with_noise};
 use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FreeParameters, widened};
-use crate::selfcalib::diagnosis::{Cause, DEVIATION_SIGMAS, doubted_centre};
+use crate::selfcalib::diagnosis::{Assumed, Cause, DEVIATION_SIGMAS, Deviation, doubted_centre};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 
@@ -99,6 +99,9 @@ const FITTING_SHARE: f64 = 0.2;
 
 /// Turns by some 0.1 rad that a reading must leave to be believed: signs and units are told by turns.
 const LEAST_TURNS: usize = 3;
+
+/// Standard deviations of a free time offset up to which it may be none: 99.7 % of normal numbers are within.
+const OFFSET_SIGMAS: f64 = 3.0;
 
 /// The mounting from a whole log.
 ///
@@ -206,6 +209,25 @@ fn fitting_misreading(
     fitting.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(misreading, _)| misreading)
 }
 
+/// The deviations of a solution, without a time offset that the score tells and the solution with a free one does not. The score takes
+/// velocities as the wheels read them, whose noise is in the poses too: of a long drive with sudden turns it told 5 sigmas of none.
+fn solved_deviations(
+    options: &LogOptions,
+    solved: &BundleProblem,
+    covariance: &Matrix3<f64>,
+    excess: f64,
+) -> Vec<Deviation> {
+    let mut deviations = solved.deviations(covariance, excess);
+    let is_offset = |d: &Deviation| d.of == Assumed::TimeOffset;
+    if deviations.iter().any(|d| is_offset(d) && d.sigmas > DEVIATION_SIGMAS * excess.sqrt())
+        && let Some(sigmas) = time_offset_sigmas(solved, options.max_iterations)
+        && sigmas <= OFFSET_SIGMAS * excess.sqrt()
+    {
+        deviations.retain(|d| !is_offset(d));
+    }
+    deviations
+}
+
 /// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed. What is suspect is told by the
 /// solution that slips pull: they may be what a delay makes of turns.
 fn report(
@@ -257,7 +279,7 @@ fn report(
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let (counts, by_landmarks) = (pulled.contradictions(), with(landmarks.as_ref(), own));
     let factors = pulled.noise_factors();
-    let deviations = pulled.deviations(&by_landmarks, factors.excess());
+    let deviations = solved_deviations(options, pulled, &by_landmarks, factors.excess());
     let suspect = pulled.suspect(o, &counts, (factors, &deviations), &by_landmarks, motions.as_ref());
     let centre = doubted_centre(&deviations, factors.excess());
     let widened_by = |centre| with(landmarks.as_ref(), with(motions.as_ref(), with(centre, own)));
