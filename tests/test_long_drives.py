@@ -21,7 +21,7 @@ SEEN = 10
 def long_log(
     ways_m: NDArray[np.float64], turns_rad: NDArray[np.float64], seed: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The odometry and the bearings of a robot that drives and turns so much in each step, among posts along its way."""
+    """The odometry and the bearings of a robot that drives and turns so in each step, among posts along its way."""
     rng = np.random.default_rng(seed)
     headings = np.cumsum(turns_rad)
     middles = headings - 0.5 * turns_rad
