@@ -87,11 +87,13 @@ class LineTurns:
             return f"lines turn {frames} {way} than the odometry tells: {remedy}"
         if self.misreading is None:
             return ""
-        missed, as_told = (math.degrees(self.missed_rad[name]) for name in (self.misreading, ""))
+        turned, as_told, missed = (
+            math.degrees(angle) for angle in (self.turned_rad, self.missed_rad[""], self.missed_rad[self.misreading])
+        )
         mirrored = ", or the image mirrored" if self.misreading == "reflected" else ""
         return (
-            f"of {math.degrees(self.turned_rad):.0f} degrees that lines turn {as_told:.0f} are otherwise than the "
-            f"odometry tells, {missed:.0f} if read otherwise: {misreading_clause(self.misreading)}{mirrored}"
+            f"lines turn {turned:.0f} degrees in all, from which the odometry differs by {as_told:.0f}, and by "
+            f"{missed:.0f} if read otherwise: {misreading_clause(self.misreading)}{mirrored}"
         )
 
 
