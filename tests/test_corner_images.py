@@ -338,6 +338,25 @@ def test_corners_of_rooms_that_show_little_of_themselves_are_found(kind: str, se
     assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
 
 
+def test_edges_of_both_images_tell_that_the_cameras_are_turned_otherwise() -> None:
+    """Places were 0.4 and 2.5 m off then, and sure."""
+    left, right = zed_cameras(1280)
+    sequence = StereoSequence(Room("l-shaped", 12002), left=left, right=right, frames=120, seed=12002)
+    down, images = -sequence.imu(seed=12002).forces_m_s2.mean(axis=0), sequence.render(20)
+    truths = np.array([sequence.left_from_object(20, n)[:3, 3] for n in range(len(sequence.corners))])
+    contradicted = "edges of both images contradict the calibration of the pair"
+    for yaw_deg, reason in ((0.0, ""), (0.25, ""), (1.0, contradicted)):
+        told = sequence.left_from_right.copy()
+        told[:3, :3] = turn("y", yaw_deg) @ told[:3, :3]
+        estimate = CornerPoseEstimator(left, right, told, method="general", down=down)(*images)
+        assert estimate.reason == reason
+        if estimate.pose is not None:
+            seen = estimate.pose.vertex_m / np.linalg.norm(estimate.pose.vertex_m)
+            ahead = truths / np.linalg.norm(truths, axis=1)[:, None] @ seen
+            off = truths[np.argmax(ahead)] - estimate.pose.vertex_m
+            assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
+
+
 def test_three_lines_of_one_image_are_no_corner_amid_edges_that_run_otherwise() -> None:
     """Any three lines that meet are a corner with right angles to one camera."""
     rng = np.random.default_rng(2)

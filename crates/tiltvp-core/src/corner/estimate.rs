@@ -18,11 +18,14 @@ pub enum CornerVerdict {
     NoneFits,
     /// There are several hypotheses and nothing to choose by.
     Ambiguous,
+    /// None fits, and edges of both images contradict how the cameras sit to each other.
+    NotOfOnePair,
 }
 
 impl CornerVerdict {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous];
+    pub const ALL: [Self; 6] =
+        [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous, Self::NotOfOnePair];
 
     /// In words.
     pub fn reason(self) -> &'static str {
@@ -32,6 +35,7 @@ impl CornerVerdict {
             Self::NoneRight => "no corner in the right image",
             Self::NoneFits => "no corner that fits",
             Self::Ambiguous => "several hypotheses and nothing to choose by",
+            Self::NotOfOnePair => "edges of both images contradict the calibration of the pair",
         }
     }
 }

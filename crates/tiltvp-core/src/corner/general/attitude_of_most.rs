@@ -8,7 +8,7 @@ use super::manhattan::manhattan;
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
 /// of one of three axes in a tenth of all cases.
-const MOST: f64 = 0.4;
+pub(crate) const MOST: f64 = 0.4;
 
 /// Attitudes about which the common one may be.
 #[derive(Debug, Clone, Default)]

@@ -28,7 +28,7 @@ pub(super) const HALF_SIGMAS: f64 = 2.0;
 const LENGTH_MIN_PX: f64 = 40.0;
 
 /// Segments that err together: the two sides of a bar, and one edge in both images.
-const ERRING_TOGETHER: f64 = 4.0;
+pub(crate) const ERRING_TOGETHER: f64 = 4.0;
 
 /// Least number of segments along the three axes: twice a corner's own three in two images.
 const LINES_MIN: usize = 12;
@@ -77,6 +77,9 @@ pub(crate) struct CommonAttitude {
     pub(crate) scatter: f64,
     /// How many edges run along the axes, those that miss them counting less.
     pub(crate) support: f64,
+    /// How far the right image's edges are turned against the left one's, as a rotation vector back, left camera's frame;
+    /// none where that may be noise, and of one image.
+    pub(crate) turned_apart: Option<Vector3<f64>>,
 }
 
 /// The attitude near `start` along whose axes most edges run, by robust least squares; none if there are too few.
@@ -112,7 +115,8 @@ pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> O
         let inverse = information.try_inverse()?;
         if step == STEPS {
             let covariance = inverse * ERRING_TOGETHER;
-            return Some(CommonAttitude { camera_from_object: rotation, covariance, scatter, support });
+            let turned_apart = None;
+            return Some(CommonAttitude { camera_from_object: rotation, covariance, scatter, support, turned_apart });
         }
         if step == STEPS / 2 {
             let middle = missed.len() / 2;
@@ -133,7 +137,7 @@ fn rotation_from(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;

@@ -220,6 +220,8 @@ impl CornerPoseEstimator {
         if let Some(best) = estimate.hypotheses.first() {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };
+        } else if common.is_some_and(|common| common.turned_apart.is_some()) {
+            estimate.verdict = CornerVerdict::NotOfOnePair;
         }
         Ok((estimate, seen))
     }

@@ -16,3 +16,4 @@ mod size;
 mod support;
 pub(super) mod track;
 mod transfer;
+mod turned_apart;

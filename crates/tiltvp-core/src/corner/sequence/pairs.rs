@@ -2,11 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::agreement::{apart, renamed};
 use super::estimator::CornerPoseEstimator;
 use super::transfer::upright;
+use super::turned_apart::untold_by_turn;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::detector::CornerDetector;
@@ -68,6 +69,12 @@ impl CornerPoseEstimator {
         if vertex.chi_square > VERTEX_SLACK * freedom * misfit_most.powi(2) {
             return Ok(Vec::new());
         }
+        let turn = common.and_then(|common| common.turned_apart);
+        let Some(mut untold) =
+            turn.map_or(Some(Matrix6::zeros()), |turn| untold_by_turn(&turn, &seen, &vertex.point_m))
+        else {
+            return Ok(Vec::new());
+        };
         let mut found: Vec<(f64, Hypothesis)> = Vec::new();
         for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
             for own in corner_attitudes(corner, &self.options.angle)?.iter() {
@@ -118,10 +125,10 @@ impl CornerPoseEstimator {
         if found.is_empty() {
             return Ok(Vec::new());
         }
-        let aside_m2 = self.aside_m2([(&self.left, left), (detector, right)], &vertex.point_m);
+        let mut of_place = untold.fixed_view_mut::<3, 3>(3, 3);
+        of_place += self.aside_m2([(&self.left, left), (detector, right)], &vertex.point_m);
         for (_, pose) in &mut found {
-            let mut of_place = pose.covariance.fixed_view_mut::<3, 3>(3, 3);
-            of_place += aside_m2;
+            pose.covariance += untold;
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = found.first().map_or(0.0, |(most, _)| *most);

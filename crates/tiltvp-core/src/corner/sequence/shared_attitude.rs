@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{agreement, fits, renamed};
 use super::estimator::CornerPoseEstimator;
+use super::turned_apart::turned_apart;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
@@ -51,7 +52,9 @@ impl CornerPoseEstimator {
 
     /// The attitude that most straight edges of the images have in common; where most have none, that near the first of `starts`.
     pub(crate) fn common(&self, starts: &Starts) -> Option<CommonAttitude> {
-        attitude_of_most(&self.lines(), starts, self.vertical_of_room())
+        let each = self.lines_of_each();
+        let common = attitude_of_most(&each.concat(), starts, self.vertical_of_room())?;
+        Some(CommonAttitude { turned_apart: turned_apart(&each, &common.camera_from_object), ..common })
     }
 
     /// The vertical, where it is known, all angles are right and there may be several corners.
@@ -100,19 +103,18 @@ impl CornerPoseEstimator {
         if from_one && corners > 1 || self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return false;
         }
-        let lines = self.lines();
+        let lines = self.lines_of_each().concat();
         let at_random = if from_one { AT_RANDOM_ALONE } else { AT_RANDOM };
         lines.len() >= EDGES_MIN && share_along_axes(&lines, &pose.camera_from_object) <= at_random
     }
 
-    /// The longer straight edges of the images that were looked at last.
-    fn lines(&self) -> Vec<StraightEdge> {
-        let mut lines: Vec<StraightEdge> =
-            StraightEdge::of(self.left.segments(&self.scratch[0]), &Matrix3::identity()).collect();
-        if let Some((detector, left_from_right)) = &self.right {
-            lines.extend(StraightEdge::of(detector.segments(&self.scratch[1]), &left_from_right.rotation));
-        }
-        lines
+    /// The longer straight edges of the images that were looked at last, those of the right one none with one camera.
+    fn lines_of_each(&self) -> [Vec<StraightEdge>; 2] {
+        let of_left = StraightEdge::of(self.left.segments(&self.scratch[0]), &Matrix3::identity()).collect();
+        let of_right = self.right.as_ref().map_or_else(Vec::new, |(detector, left_from_right)| {
+            StraightEdge::of(detector.segments(&self.scratch[1]), &left_from_right.rotation).collect()
+        });
+        [of_left, of_right]
     }
 }
 
@@ -164,6 +166,7 @@ mod tests {
             covariance: Matrix3::from_diagonal_element(1e-6),
             scatter: 1.0,
             support: 50.0,
+            turned_apart: None,
         };
         let pose_of = |attitude: Matrix3<f64>| Hypothesis {
             camera_from_object: attitude,
