@@ -357,6 +357,14 @@ def test_edges_of_both_images_tell_that_the_cameras_are_turned_otherwise() -> No
             assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
 
 
+def test_a_cuboid_that_misfits_the_calibration_is_none() -> None:
+    """Its place was 128 mm off, and sure."""
+    for focal, reason in ((400.0, ""), (440.0, "no corner that fits")):
+        camera = tiltvp.Camera.pinhole(width=480, height=360, fx=focal, fy=focal, cx=240.0, cy=180.0)
+        estimate = CornerPoseEstimator(camera, camera, LEFT_FROM_RIGHT)(*pair(COLOURS))
+        assert estimate.reason == reason
+
+
 def test_three_lines_of_one_image_are_no_corner_amid_edges_that_run_otherwise() -> None:
     """Any three lines that meet are a corner with right angles to one camera."""
     rng = np.random.default_rng(2)

@@ -199,8 +199,9 @@ def test_tables_of_readings(tmp_path: Path) -> None:
 def test_an_estimator_takes_what_is_known_of_a_frame(sequence: StereoSequence) -> None:
     left, right = sequence.cameras
     samples = samples_of(sequence, 1)
-    told = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured")
-    plain = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured")
+    # Pixels of one sample have jagged edges: one frame's misfit is 2.7.
+    told = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured", misfit_max=10.0)
+    plain = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured", misfit_max=10.0)
     before = None
     for frame, time_s in enumerate(sequence.times_s.tolist()):
         images = sequence.render(frame)

@@ -130,13 +130,7 @@ impl PairSearch<'_> {
             let camera = (self.detector, self.left_from_right);
             estimator.pair_poses([&corners[0], &corners[1]], camera, &self.priors, *common, most)
         };
-        let share = if one_object {
-            1.0
-        } else if is_strict {
-            WELL
-        } else {
-            FAIRLY
-        };
+        let share = if is_strict { WELL } else { FAIRLY };
         let misfit_most = share * estimator.options.misfit_max;
         let corners = shown.as_ref().map_or(features.map(|corner| *corner), |shown| shown.corners);
         let poses = of(&corners, misfit_most)?;

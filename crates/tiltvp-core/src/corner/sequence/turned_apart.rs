@@ -10,7 +10,7 @@ use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::geometry::RigidMotion;
 
 /// The 95 % quantile of chi-square of 3. Where the attitudes of both images are farther apart, the calibration is off
-/// or the images are of two times. Of 119 pairs of ten rendered rooms whose calibration is right none has more than 1.3.
+/// or the images are of two times. Of 119 pairs of ten rendered rooms with right calibration none has more than 1.3.
 const DOUBT_CHI_SQUARE: f64 = 7.8;
 
 /// The attitude from both images lies between those of either, and may be off by half of how far these are apart.
