@@ -83,6 +83,8 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     said = run("colours", "--pitch", "-28", order=("right", "left"))
     assert "no corner that fits (1)" in said
     assert "try: that left and right are not exchanged, of one moment" in said
+    assert advice("edges contradict the calibration", ("general",), is_pair=True, given={}).startswith("that left and")
+    assert "--camera-from-imu" in advice("edges contradict the gravity", ("general",), is_pair=True, given={})
     for reason in ("no corner in the left image", "no corner that fits"):
         for given, told in (({}, False), ({"down": (0.0, 1.0, 0.0)}, True)):
             tries = advice(reason, ("coloured", "general"), is_pair=False, given=given)

@@ -134,7 +134,11 @@ def advice(reason: str, methods: tuple[str, ...], *, is_pair: bool, given: Mappi
         helps += [] if given.get("right_handed") is not None else ["--right-handed for the outside of a box"]
         helps += [] if is_pair else ["a second camera"]
         return ", ".join(helps) or "a smaller --down-sigma-deg if the direction down is known well"
-    pair = "that left and right are not exchanged, of one moment and of this calibration"
+    if "gravity" in reason:
+        return "--camera-from-imu from the sensor's axes to the camera's, readings of the frames' own times"
+    pair = "that left and right are not exchanged, of one moment and of this calibration, in metres"
+    if "calibration" in reason:
+        return pair
     causes = [pair, "a larger --misfit-max"] if is_pair else []
     causes += [] if given.get("down") is None else ["another --pitch or --down"]
     return ", ".join([*causes, "--gamma for level edges at another angle"])

@@ -20,12 +20,21 @@ pub enum CornerVerdict {
     Ambiguous,
     /// None fits, and edges of both images contradict how the cameras sit to each other.
     NotOfOnePair,
+    /// None fits, and most edges contradict the direction of gravity that is told.
+    AgainstGravity,
 }
 
 impl CornerVerdict {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous, Self::NotOfOnePair];
+    pub const ALL: [Self; 7] = [
+        Self::Found,
+        Self::NoneLeft,
+        Self::NoneRight,
+        Self::NoneFits,
+        Self::Ambiguous,
+        Self::NotOfOnePair,
+        Self::AgainstGravity,
+    ];
 
     /// In words.
     pub fn reason(self) -> &'static str {
@@ -36,6 +45,7 @@ impl CornerVerdict {
             Self::NoneFits => "no corner that fits",
             Self::Ambiguous => "several hypotheses and nothing to choose by",
             Self::NotOfOnePair => "edges of both images contradict the calibration of the pair",
+            Self::AgainstGravity => "no corner that fits, and most edges contradict the gravity that is told",
         }
     }
 }

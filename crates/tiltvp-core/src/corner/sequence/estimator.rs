@@ -222,6 +222,8 @@ impl CornerPoseEstimator {
             estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };
         } else if common.is_some_and(|common| common.turned_apart.is_some()) {
             estimate.verdict = CornerVerdict::NotOfOnePair;
+        } else if common.is_some_and(|common| self.is_against_gravity(&common)) {
+            estimate.verdict = CornerVerdict::AgainstGravity;
         }
         Ok((estimate, seen))
     }

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
-use crate::corner::estimate::Hypothesis;
 use crate::error::{Error, Result};
 use crate::filter::positive_semidefinite;
 use crate::geometry::{check_rotation, tangent_basis, tangent_log};
@@ -47,12 +46,12 @@ impl GravityDirection {
         AttitudePrior::Gravity { down: self.down, sigma_rad: self.sigma_rad, sense: VerticalSense::Either }
     }
 
-    /// Whether the upright edge of a pose is along this direction, either way, by what both are known to.
-    pub(super) fn is_along(&self, pose: &Hypothesis) -> bool {
-        let vertical = pose.camera_from_object.column(1).into_owned();
+    /// Whether the upright axis of an attitude is along this direction, either way, by what both are known to.
+    pub(super) fn is_along(&self, camera_from_object: &Matrix3<f64>, covariance: &Matrix3<f64>) -> bool {
+        let vertical = camera_from_object.column(1).into_owned();
         let off = tangent_log(&self.down, &(vertical * vertical.dot(&self.down).signum()));
         let turn = tangent_basis(&self.down).transpose() * vertical.cross_matrix();
-        let own = turn * pose.covariance.fixed_view::<3, 3>(0, 0) * turn.transpose();
+        let own = turn * covariance * turn.transpose();
         let spread = own + Matrix2::from_diagonal_element(self.sigma_rad.powi(2) + UNTOLD_RAD.powi(2));
         spread.cholesky().is_some_and(|factor| off.dot(&factor.solve(&off)) <= UPRIGHT_CHI_SQUARE)
     }

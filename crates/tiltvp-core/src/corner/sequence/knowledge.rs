@@ -70,7 +70,11 @@ impl CornerPoseEstimator {
     /// Whether gravity, where this frame has it, bears a pose out. A corner without colours has an upright edge; the coloured
     /// cuboid may be held aslant.
     pub(super) fn is_upright(&self, pose: &Hypothesis) -> bool {
-        self.is_one_object() || self.known.gravity.is_none_or(|gravity| gravity.is_along(pose))
+        self.is_one_object()
+            || self.known.gravity.is_none_or(|gravity| {
+                let covariance = pose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+                gravity.is_along(&pose.camera_from_object, &covariance)
+            })
     }
 
     /// Covariance of the attitude of a track as it is known at this frame, before its images.
@@ -159,10 +163,9 @@ mod tests {
     fn an_upright_edge_is_along_gravity_by_what_both_are_known_to() {
         let along = |off_deg: f64, gravity_deg: f64, own_deg: f64| {
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), off_deg.to_radians());
-            let mut pose = track(&Matrix3::identity()).pose;
-            pose.covariance = Matrix6::from_diagonal_element(own_deg.to_radians().powi(2));
+            let own = Matrix3::from_diagonal_element(own_deg.to_radians().powi(2));
             let gravity = GravityDirection { down: turn * Vector3::y(), sigma_rad: gravity_deg.to_radians() };
-            gravity.is_along(&pose)
+            gravity.is_along(&Matrix3::identity(), &own)
         };
         // Either way; 3.7 standard deviations are its end, those of gravity, of the pose, and of what it does not tell.
         assert!(along(0.0, 0.5, 0.0) && along(181.0, 0.5, 0.0));

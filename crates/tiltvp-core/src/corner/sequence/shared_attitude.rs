@@ -9,7 +9,7 @@ use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::attitude_of_most::{Starts, attitude_of_most};
+use crate::corner::general::attitude_of_most::{MOST, Starts, attitude_of_most};
 use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, share_along_axes};
 use crate::error::Result;
 
@@ -55,6 +55,14 @@ impl CornerPoseEstimator {
         let each = self.lines_of_each();
         let common = attitude_of_most(&each.concat(), starts, self.vertical_of_room())?;
         Some(CommonAttitude { turned_apart: turned_apart(&each, &common.camera_from_object), ..common })
+    }
+
+    /// Whether most straight edges of the images contradict the gravity that is told in this frame.
+    pub(super) fn is_against_gravity(&self, common: &CommonAttitude) -> bool {
+        let attitude = self.upright(common.camera_from_object);
+        let most = MOST * self.lines_of_each().iter().map(Vec::len).sum::<usize>() as f64;
+        let told = self.known.gravity.filter(|_| common.support >= most);
+        told.is_some_and(|gravity| !gravity.is_along(&attitude, &common.covariance))
     }
 
     /// The vertical, where it is known, all angles are right and there may be several corners.
