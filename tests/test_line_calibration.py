@@ -193,7 +193,7 @@ def test_wheels_that_are_swapped_are_named(drive: Drive, seen: list[SeenFrame]) 
     found = calibrate_lines(told(seen, swapped, drive.wheel_base_m), solve)
     assert not found.settled
     assert found.misreading == "reflected"
-    for words in ("otherwise than the odometry tells", "wheels swapped", "the image mirrored"):
+    for words in ("if read otherwise", "wheels swapped", "the image mirrored"):
         assert words in found.doubt
 
 
