@@ -73,3 +73,12 @@ def test_nothing_is_suspect(way: Callable[[], tuple[NDArray[np.float64], NDArray
     off = np.array([mounting.x_m, mounting.y_m, mounting.yaw_rad]) - MOUNTING
     # The 99.9 % quantile of chi-square of three numbers.
     assert off @ np.linalg.solve(mounting.covariance_xy_yaw, off) < 16.27
+
+
+@pytest.mark.slow
+def test_the_wheel_base_is_not_longer_than_it_is() -> None:
+    # Each step has noise of a tenth of its turn.
+    odometry, bearings = long_log(*arc(), seed=3)
+    options = {"wheel_base_m": 0.38, "odometry_k_m": ODOMETRY_K_M}
+    found = tiltvp.calibrate(odometry, bearings, estimate_odometry=True, **options)
+    assert abs(found.wheel_base_m - WHEEL_BASE_M) < 3.0 * found.wheel_base_sigma_m

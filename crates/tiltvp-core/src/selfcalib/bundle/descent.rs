@@ -21,7 +21,7 @@ const LEAST_DAMPING: f64 = 1e-9;
 /// Damping above which there is no way down: a step is then below rounding.
 const MOST_DAMPING: f64 = 1e9;
 
-/// Damping from which on a small gain does not mean convergence: the step is short because of the damping.
+/// Damping from which on a small gain means nothing: the step is short because of the damping.
 const CONVERGED_DAMPING: f64 = 1e-2;
 
 /// What an undamped step may be predicted to gain where a descent that makes no way has converged: the rise of the cost at one standard
@@ -140,7 +140,8 @@ impl BundleProblem {
         self.descend(max_iterations, tolerance, damping, false)
     }
 
-    /// The same where the anchors of landmarks may be moved: not in a sliding window, whose prior is about them.
+    /// The same where the anchors of landmarks may be moved: not in a sliding window, whose prior is about them. Along a long way even little
+    /// damping hides what bends it: only an undamped step tells that there is nothing to gain.
     pub(crate) fn levenberg_marquardt_carrying(
         &mut self,
         max_iterations: u32,

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
+use super::motion_residual::MotionResidual;
 use super::problem::BundleProblem;
 use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between, between_jacobians};
 
@@ -76,8 +77,11 @@ impl BundleProblem {
     pub(crate) fn motion_blocks(&self, from: usize, equations: &mut NormalEquations) -> MotionBlocks {
         let (keyframe, after) = (&self.keyframes[from], &self.keyframes[from + 1]);
         let b = between(&keyframe.pose, &after.pose);
-        let (by_before, by_after) = between_jacobians(&keyframe.pose, &b);
-        let r = b - after.odometry.motion;
+        let (mut by_before, mut by_after) = between_jacobians(&keyframe.pose, &b);
+        let MotionResidual { off: r, as_read } = self.motion_residual(from + 1);
+        if let Some((reading, _)) = &as_read {
+            (by_before, by_after) = (reading * by_before, reading * by_after);
+        }
         let squared = r.dot(&(after.information * r));
         let weighted = after.information * self.slip.weight(squared);
         let (wb, wa, wr) = (weighted * by_before, weighted * by_after, weighted * r);
@@ -92,7 +96,11 @@ impl BundleProblem {
             after_wheels: Matrix3x2::zeros(),
         };
         if self.free.wheels {
-            let j = -after.odometry.by_wheels;
+            let mut j = -after.odometry.by_wheels;
+            if let Some((reading, by_base)) = &as_read {
+                j = reading * j;
+                j.set_column(1, &(j.column(1) + by_base));
+            }
             let own = j.transpose() * weighted * j;
             let side = j.transpose() * wr;
             for a in 0..2 {

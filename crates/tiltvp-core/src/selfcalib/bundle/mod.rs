@@ -10,6 +10,7 @@ mod keyframe;
 mod landmark_distance;
 mod linearisation;
 mod link;
+mod motion_residual;
 mod pose_elimination;
 mod problem;
 mod scatter;

@@ -30,6 +30,10 @@ pub(crate) struct BundleProblem {
     /// Whether velocities are those of the wheels, in place of those of the estimated poses, which at the solution of a wrong time offset are
     /// distorted by it.
     pub(crate) as_wheels_read: bool,
+    /// Whether turns are compared as they are read, with the wheel base that is told; else in radians, in which their noise makes the best
+    /// free base longer than the true one, but which turns that are contradicted mislead less.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) turns_as_read: bool,
     pub(crate) free: FreeParameters,
     pub(crate) noise: MotionNoise,
     pub(crate) landmarks: Vec<InverseDistanceLandmark>,
@@ -99,6 +103,7 @@ impl BundleProblem {
             centre: Vector2::zeros(),
             late: false,
             as_wheels_read: false,
+            turns_as_read: false,
             free,
             noise: options.motion_noise(),
             landmarks: Vec::new(),
@@ -329,28 +334,6 @@ impl BundleProblem {
             fit.add(residual, self.loss);
         }
         fit
-    }
-
-    /// What the motion to a keyframe adds to the cost.
-    pub(crate) fn motion_cost(&self, to: usize) -> f64 {
-        self.slip.cost(self.motion_misfit(to))
-    }
-
-    /// Whether there is a motion whose wheels must have slipped.
-    pub(crate) fn any_slipped(&self) -> bool {
-        (1..self.keyframes.len()).any(|to| self.slipped(to))
-    }
-
-    /// Whether the motion to a keyframe differs so much from its odometry that the wheels must have slipped.
-    pub(crate) fn slipped(&self, to: usize) -> bool {
-        self.slip.weight(self.motion_misfit(to)) < 1.0
-    }
-
-    /// The squared Mahalanobis distance of the motion to a keyframe from its odometry.
-    fn motion_misfit(&self, to: usize) -> f64 {
-        let (before, keyframe) = (&self.keyframes[to - 1], &self.keyframes[to]);
-        let r = between(&before.pose, &keyframe.pose) - keyframe.odometry.motion;
-        r.dot(&(keyframe.information * r))
     }
 
     /// The whitened residuals of all bearings, in the order of keyframes and observations.

@@ -51,6 +51,7 @@ impl BundleProblem {
         let covariance = &(covariance * excess);
         let mut problem = self.with_free(FreeParameters::ALL);
         problem.as_wheels_read = !self.free.offset;
+        problem.turns_as_read = true;
         // What outliers pull is no deviation.
         problem.loss = BearingLoss::Truncated(OUTLIER_SIGMAS);
         let mut found = self.deviations_of(&problem, covariance, excess);

@@ -14,6 +14,7 @@ const SCATTER_ROUNDS: usize = 4;
 /// Solves a problem with robust losses, then without outliers, then with the scatters of the landmarks.
 pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
     problem.slip = MotionLoss::Logarithmic;
+    problem.turns_as_read = true;
     let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
         problem.loss = loss;
         problem.levenberg_marquardt_carrying(max_iterations, TOLERANCE, FIRST_DAMPING)
