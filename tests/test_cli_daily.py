@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -170,3 +171,15 @@ def test_what_is_missing_is_said_in_one_line(run: Run, words: tuple[object, ...]
     assert done.stderr.count("\n") == 1
     assert "pip install 'tiltvp[lab]'" in done.stderr
     assert done.stdout == ""
+
+
+def test_what_is_broken_is_said_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "polars.py").write_text("raise ImportError('libmissing.so.1: cannot open shared object file')\n")
+    done = subprocess.run(
+        [sys.executable, "-c", "from tiltvp.cli import main; raise SystemExit(main())", "measure", "lines"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == (
+        "tiltvp: a package that is installed cannot be imported: libmissing.so.1: cannot open shared object file\n"
+    )

@@ -85,6 +85,11 @@ def run_words(arguments: Sequence[str] | None) -> int:
     except (MissingExtraError, OutputError) as error:
         complain(str(error))
         return SOME_FAILED
+    except ImportError as error:
+        if (error.name or "").startswith("tiltvp"):
+            raise
+        complain(f"a package that is installed cannot be imported: {error}")
+        return SOME_FAILED
     except MemoryError:
         complain("the memory does not suffice, expected a smaller camera, image or file")
         return SOME_FAILED
