@@ -20,7 +20,7 @@ pub(crate) enum Assumed {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Deviation {
     pub(crate) of: Assumed,
-    /// How far it is off: of the wheel base the logarithm, of the centre the distance.
+    /// How far it is off: of the wheel base in units of that, of the centre the distance.
     pub(crate) value: f64,
     /// The same in standard deviations.
     pub(crate) sigmas: f64,
@@ -42,7 +42,7 @@ pub(crate) fn doubted_centre(deviations: &[Deviation], excess: f64) -> Option<&D
 }
 
 impl BundleProblem {
-    /// The deviations of the imbalance, of the logarithm of the wheel base, of the time offset and of the image centre from what is
+    /// The deviations of the imbalance, of the wheel base, of the time offset and of the image centre from what is
     /// assumed, each as if it alone were free too; none of what is free anyway. `covariance` is that of the mounting, and noise has
     /// `excess` times the variance that is told.
     ///

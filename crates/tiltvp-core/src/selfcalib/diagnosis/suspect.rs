@@ -142,7 +142,8 @@ impl BundleProblem {
         if let Some(d) = worst {
             return match d.of {
                 Assumed::Imbalance => found(Cause::Wheels, (2.0 * (self.wheels.imbalance + d.value)).exp()),
-                Assumed::WheelBase => found(Cause::WheelBase, self.wheels.base_m * d.value.exp()),
+                // Readings are linear in the base; below zero where they turn to the other side.
+                Assumed::WheelBase => found(Cause::WheelBase, self.wheels.base_m * (1.0 + d.value).abs()),
                 Assumed::TimeOffset => found(Cause::TimeOffset, d.value),
                 // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre.
                 Assumed::Centre => bump().or_else(|| found(Cause::Centre, d.value)),
