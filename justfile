@@ -34,12 +34,13 @@ quick-extension:
 # Sets up; checks and tests everything that needs neither data nor programs of the system.
 test: setup check test-rust test-python
 
-# Debian's chromium, valgrind and Xvfb, by apt-get, if they are not there.
+# Debian's chromium, valgrind and Xvfb, and the Tk of its Python, by apt-get, if they are not there.
 system-programs:
     #!/usr/bin/env bash
     set -euo pipefail
     missing=""
     for name in chromium valgrind Xvfb; do command -v $name > /dev/null || missing="$missing ${name,,}"; done
+    {{bin}}/python -c "import tkinter" 2> /dev/null || missing="$missing python3-tk"
     [ -z "$missing" ] || {{just_executable()}} install-packages $missing
 
 # The only recipe that installs into the system: this, what the tests of the system want, and ViSP for `measure-visp`.
