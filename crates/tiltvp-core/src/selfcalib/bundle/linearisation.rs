@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
 use super::motion_residual::MotionResidual;
 use super::problem::BundleProblem;
-use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between, between_jacobians};
+use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between_jacobians};
 
 /// Normal equations: `information step = rhs`.
 pub(crate) struct NormalEquations {
@@ -76,9 +76,8 @@ impl BundleProblem {
     /// The part of the motion that follows a keyframe. The block of the wheels alone is added to the normal equations.
     pub(crate) fn motion_blocks(&self, from: usize, equations: &mut NormalEquations) -> MotionBlocks {
         let (keyframe, after) = (&self.keyframes[from], &self.keyframes[from + 1]);
-        let b = between(&keyframe.pose, &after.pose);
-        let (mut by_before, mut by_after) = between_jacobians(&keyframe.pose, &b);
-        let MotionResidual { off: r, as_read } = self.motion_residual(from + 1);
+        let MotionResidual { motion, off: r, as_read } = self.motion_residual(from + 1);
+        let (mut by_before, mut by_after) = between_jacobians(&keyframe.pose, &motion);
         if let Some((reading, _)) = &as_read {
             (by_before, by_after) = (reading * by_before, reading * by_after);
         }

@@ -7,6 +7,8 @@ use crate::selfcalib::model::between;
 
 /// What is between a motion and its odometry.
 pub(crate) struct MotionResidual {
+    /// The motion by the poses.
+    pub(crate) motion: Vector3<f64>,
     /// The difference, in the frame of the keyframe before.
     pub(crate) off: Vector3<f64>,
     /// Where turns are compared as they are read: what makes that of a difference in radians, and how much this one grows with the logarithm
@@ -24,14 +26,14 @@ impl BundleProblem {
         let motion = between(&before.pose, &after.pose);
         let off = motion - after.odometry.motion;
         if !self.free.wheels || !self.turns_as_read {
-            return MotionResidual { off, as_read: None };
+            return MotionResidual { motion, off, as_read: None };
         }
         // A chord turns by half of its arc.
         let by_turn = Vector3::new(-0.5 * motion.y, 0.5 * motion.x, 1.0);
         let base = self.wheels.base_m / self.prior_mean[4].exp();
         let mut reading = Matrix3::identity();
         reading.column_mut(2).axpy(base - 1.0, &by_turn, 1.0);
-        MotionResidual { off: reading * off, as_read: Some((reading, by_turn * (base * off.z))) }
+        MotionResidual { motion, off: reading * off, as_read: Some((reading, by_turn * (base * off.z))) }
     }
 
     /// What the motion to a keyframe adds to the cost.
