@@ -190,5 +190,5 @@ def test_images_of_another_size_are_told_what_fits(run: Run, tmp_path: Path, siz
     Camera.from_view(width=640, height=480, view_rad=3.0).save(camera)
     tiltvp.write_image(image, np.zeros((size[1], size[0]), np.uint8))
     said = run("tilt", image, "--camera", camera)
-    assert said.code == 1
+    assert said.code == 2
     assert told in said.err

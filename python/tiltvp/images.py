@@ -13,7 +13,7 @@ from tiltvp import _core
 from tiltvp.arguments import path_from, refuse_unless
 from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
 from tiltvp.files import read_bytes, write_whole
-from tiltvp.image_headers import header_size, unturned
+from tiltvp.image_headers import file_size, header_size, unturned
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -27,11 +27,13 @@ __all__ = [
     "decode_image",
     "gray_from",
     "grays_from",
+    "image_size",
     "is_as_stored",
     "is_shallow",
     "pixels_from",
     "read_image",
     "read_mask",
+    "size_problem",
     "write_image",
 ]
 
@@ -46,6 +48,7 @@ _TONE, _ASTRAY = 16, 0.15
 """Grey levels by which pixels of a mask may be off its two tones, and the share of those that are farther off: 0.12 of
 a mask whose borders were blurred by 6 pixels, 0.01 by the strongest compression of JPEG, 0.21 and more of 114
 photographs."""
+_NOT_DECODED: Final = "not an image that can be decoded"
 _NO_ALPHA: Final = (0, 2, 3)
 """Colour types of PNG, of which 4 and 6 have opacity for each pixel (PNG 11.2.2)."""
 _DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jp2")
@@ -136,6 +139,12 @@ def camera_grays(images: Iterable[ArrayLike], camera: _core.Camera) -> Iterator[
         yield gray
 
 
+def size_problem(size: tuple[int, int], camera: _core.Camera) -> str:
+    """What is wrong with an image of that (width, height), as the core says it."""
+    expected = f"{camera.height} x {camera.width} (rows x columns), as the camera's images"
+    return f"got {size[1]} x {size[0]} pixels, expected {expected}"
+
+
 def checked_camera(camera: object) -> None:
     """Raises `InvalidInputError` for what is no camera, such as the path of one or a `Robot`."""
     refuse_unless(camera, _core.Camera, "camera", "a tiltvp.Camera")
@@ -220,6 +229,16 @@ def image_bytes(file: Path) -> bytes:
         raise ImageFileError(f"{file}: {error.strerror or error}") from error
 
 
+def image_size(path: str | os.PathLike[str]) -> tuple[int, int]:
+    """(width, height) by the header of an image file. Raises `ImageFileError` with the path, as `read_image` does."""
+    file = path_from(path)
+    try:
+        size = file_size(file)
+    except OSError as error:
+        raise ImageFileError(f"{file}: {error.strerror or error}") from error
+    return size or _header_of(image_bytes(file), str(file))
+
+
 def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     """The content of an image file as `read_image` gives it. Raises `ImageFileError` that begins with `name`."""
     try:
@@ -244,13 +263,20 @@ def is_shallow(file: Path) -> bool:
 
 
 def _decoded(data: bytes, name: str) -> NDArray[Any]:
-    size = header_size(data)
-    if size is not None and size[0] * size[1] > _core.MOST_PIXELS:
-        raise ImageFileError(f"{name}: {size[0]} x {size[1]} pixels, expected at most {_core.MOST_PIXELS} in all")
-    image = None if size is None else _decode(data)
+    width, height = _header_of(data, name)
+    if width * height > _core.MOST_PIXELS:
+        raise ImageFileError(f"{name}: {width} x {height} pixels, expected at most {_core.MOST_PIXELS} in all")
+    image = _decode(data)
     if image is None:
-        raise ImageFileError(f"{name}: not an image that can be decoded ({len(data)} bytes)")
+        raise ImageFileError(f"{name}: {_NOT_DECODED} ({len(data)} bytes)")
     return image
+
+
+def _header_of(data: bytes, name: str) -> tuple[int, int]:
+    size = header_size(data)
+    if size is None:
+        raise ImageFileError(f"{name}: {_NOT_DECODED} ({len(data)} bytes)")
+    return size
 
 
 def _decode(data: bytes) -> NDArray[Any] | None:

@@ -12,7 +12,7 @@ import numpy as np
 from tiltvp.arguments import each_from, refuse_unless
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
-from tiltvp.images import checked_camera, gray_from
+from tiltvp.images import checked_camera, gray_from, size_problem
 from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot import Robot
 from tiltvp.rotations import mounting_from
@@ -301,15 +301,13 @@ def _image_of(frame: Frame, camera: _core.Camera) -> Image | TiltvpError:
     image = frame.image
     if isinstance(image, TiltvpError) or image.shape[:2] == (camera.height, camera.width):
         return image
-    # As the core says it of an image that is given to an estimator.
-    got = f"got {image.shape[0]} x {image.shape[1]} pixels"
-    expected = f"expected {camera.height} x {camera.width} (rows x columns), as the camera's images"
-    return InvalidInputError(f"{frame.name}: {got}, {expected}")
+    return InvalidInputError(f"{frame.name}: {size_problem((image.shape[1], image.shape[0]), camera)}")
 
 
 def _first_problem(frames: Frames, camera: _core.Camera) -> str:
-    """What is wrong with the first frame that cannot be used, to be put behind a sentence; empty where none is."""
-    images = (_image_of(frame, camera) for frame in frames.sample(range(min(frames.count or 0, LEAST))))
+    """What is wrong with the first frame that cannot be used and is not told, to be put behind a sentence; or empty."""
+    first = frames.sample(range(min(frames.count or 0, LEAST)))
+    images = (_image_of(frame, camera) for frame in first if frame.name not in frames.told)
     return next((f": {image}" for image in images if isinstance(image, TiltvpError)), "")
 
 

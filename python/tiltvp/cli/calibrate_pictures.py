@@ -105,7 +105,8 @@ class PictureLog:
         if pictures.tracks is not None:
             check_ending(pictures.tracks)
         looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
-        frames, lens = looked.open([source]), camera.load(looked.topic)
+        lens = camera.load(looked.topic)
+        frames = looked.open([source], lens)
         lines.extractor(lens), lines.tilts(lens)  # Refuses options before there is any work.
         motion = motion.of_robot(robot, frames)
         late_s = 0.0
@@ -183,8 +184,11 @@ class PictureLog:
         more than the memory holds."""
         extractor = self.lines.extractor(self.camera, rotation=rotation)
         drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), self.moved)
-        count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
-        with ending_at_interrupt(self.frames) as coming, progress_bar(count, f"{self.name}: lines") as bar:
+        count, nothing, told = len(self.moved.motions), np.zeros((0, 0), np.uint8), self.frames.told
+        with (
+            ending_at_interrupt(self.frames) as coming,
+            progress_bar(count, f"{self.name}: lines", told=told) as bar,
+        ):
             seen = [((frame.name, frame.time_s), replace(one, gray=nothing)) for frame, one in drive.seen(coming, bar)]
         self.bad = drive.bad
         if drive.told():

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.cli.sources import picture_names
 from tiltvp.cli.tables import Table, need_lab
-from tiltvp.cli.terminal import named, progress_bar
+from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError, RunError
 from tiltvp.files import check_output, write_whole
 
@@ -90,7 +90,7 @@ def on_cluster(address: str, frames: ImageFiles, task: Task, folder: Path) -> tu
         missing = [number for number, part in parts.items() if not part.exists()]
         count = sum(min(_CHUNK, len(frames.files) - starts[number]) for number in missing)
         before = len(frames.files) - count
-        with progress_bar(len(frames.files), "images", done=before) as bar:
+        with progress_bar(len(frames.files), "images", done=before, told=frames.told) as bar:
             for number, table in results_of(address, _do, job, _chunks(frames, set(missing))) if missing else ():
                 _rename(table, frames.files[starts[number] : starts[number] + _CHUNK])
                 memory = io.BytesIO()
@@ -99,7 +99,7 @@ def on_cluster(address: str, frames: ImageFiles, task: Task, folder: Path) -> tu
                 for row in table.rows:
                     problem = row.get("problem") or row["error"]
                     if problem is not None:
-                        bar.complain(named(row["file"], problem))
+                        bar.blame(row["file"], problem)
                     bar.advance()
     return before, pl.scan_parquet(list(parts.values()))
 

@@ -143,14 +143,15 @@ def corner(
     robot, known = _robot_of(calibration, known)
     source = source.of_robot(robot, words)
     sensor = inertial.of_robot(robot).knowledge(source.topic)
-    camera, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
-    frames = source.open(words)
-    others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
+    cameras, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
+    frames, others = source.open(words, cameras[0]), None
+    if right is not None:
+        others = SourceOptions(topic=topic_right).open([right], cameras[1], topic_option="--topic-right")
     for side in (frames, others):
         check_apart(side, *results.files.values(), beside=(inertial.imu, options.mask, calibration))
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
-        look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
+        look = Look(cameras[0], estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, partners, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {counted(look.bad, 'frames')}, none of which can be used")
@@ -185,6 +186,7 @@ class Look:
         `InvalidInputError` for frames without a time where readings of a sensor have times.
         """
         rights = None if others is None else Repeats(others)
+        told = {*frames.told, *(() if others is None else others.told)}
         with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
             lefts = zip(itertools.count(), coming, picture_names(frames), strict=False)
             pairs: Iterable[tuple[tuple[int, Frame, str], Frame | None]]
@@ -200,7 +202,9 @@ class Look:
                     images = [one.read() for one in pair]
                     estimate = self._estimate(images, time_s)
                 except TiltvpError as error:
-                    bar.complain(_blamed([one.name for one in pair], str(error)))
+                    names = [one.name for one in pair]
+                    if told.isdisjoint(names):
+                        bar.complain(_blamed(names, str(error)))
                     self.bad += 1
                 else:
                     self._draw(name, number, frame.time_s if rate_hz is None else time_s, images[0], estimate)
@@ -255,7 +259,8 @@ def _searches(
     known: dict[str, Any],
     robot: Robot | None,
     image_size: tuple[int, int] | None,
-) -> tuple[Camera, Searches]:
+) -> tuple[tuple[Camera, ...], Searches]:
+    """The cameras, left and right of a pair, and what is looked for in their images."""
     from tiltvp import Camera
     from tiltvp.corner import CornerPoseEstimator
     from tiltvp.stereo_rigs import StereoRig
@@ -267,10 +272,10 @@ def _searches(
         mask = None if robot is None else robot.mask
         own = {name: {"mask": mask} if mask is not None and name == "general" else {} for name in methods}
         found = {name: CornerPoseEstimator(camera, method=name, **(own[name] | known)) for name in methods}
-        return camera, Searches(found)
+        return (camera,), Searches(found)
     rig = StereoRig.load(calibration, image_size=image_size)
     pair = (rig.left, rig.right, rig.left_from_right)
-    return rig.left, Searches({name: CornerPoseEstimator(*pair, method=name, **known) for name in methods})
+    return pair[:2], Searches({name: CornerPoseEstimator(*pair, method=name, **known) for name in methods})
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:

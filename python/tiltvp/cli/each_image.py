@@ -11,12 +11,14 @@ from cyclopts import Parameter
 
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Out, check_ending
-from tiltvp.cli.terminal import named, progress_bar
+from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import OutputError, TiltvpError
 from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from tiltvp import Camera
 
     Image = NDArray[Any]
 
@@ -50,6 +52,7 @@ class FoundOptions:
 def find_in_each(
     images: list[str] | None,
     source: SourceOptions,
+    camera: Camera,
     look: Callable[[Image], Found],
     results: FoundOptions,
     draw: Callable[[Image, Found], Image],
@@ -62,11 +65,11 @@ def find_in_each(
     """
     from tiltvp.images import gray_from, write_image
 
-    frames, overlay = source.open(images or []), results.overlay
+    frames, overlay = source.open(images or [], camera), results.overlay
     check_apart(frames, overlay, results.out, beside=beside)
     found: list[tuple[str, Found]] = []
     well = not frames.problems
-    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:
+    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images", told=frames.told) as bar:
         for frame, name in zip(coming, picture_names(frames), strict=False):
             try:
                 gray = gray_from(frame.read())
@@ -77,7 +80,7 @@ def find_in_each(
             except OutputError:
                 raise
             except TiltvpError as error:
-                bar.complain(named(frame.name, str(error)))
+                bar.blame(frame.name, str(error))
                 well = False
             bar.advance()
     return found, well

@@ -102,7 +102,7 @@ def level(
         check_cluster(out, filter=filtering.filter)
     if cluster is None or not is_begun(out / TILTS):
         check_output(out) if as_video else check_output_folder(out)
-    frames = source.open(images or [])
+    frames = source.open(images or [], looks.camera)
     of_files = isinstance(frames, ImageFiles)
     path = out if as_video or of_files else out / f"{Path(frames.source).stem}.mp4"
     calibration = None if camera is None else camera.camera

@@ -13,7 +13,7 @@ from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.sources import ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Table
-from tiltvp.cli.terminal import named, progress_bar
+from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.images import read_mask
 
@@ -166,13 +166,13 @@ def write_images(
 ) -> tuple[int, int]:
     """Writes level images into a folder, JPEG as JPEG, others as PNG; how many of how many were made level."""
     judge, levelled = work.filtering.judge(), 0
-    with ending_at_interrupt(frames) as coming, progress_bar(len(frames.files), "images") as bar:
+    with ending_at_interrupt(frames) as coming, progress_bar(len(frames.files), "images", told=frames.told) as bar:
         for frame, name, motion in zip(coming, picture_names(frames), motions, strict=False):
             _, problem = _level(frame, motion, folder / name, work, judge)
             if problem is None:
                 levelled += 1
             else:
-                bar.complain(named(Path(frame.name), problem))
+                bar.blame(Path(frame.name), problem)
             bar.advance()
     judge.plot()
     return levelled, len(frames.files)

@@ -59,7 +59,7 @@ def mount(
     robot = camera.robot()
     source = source.of_robot(robot, images)
     estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(source.topic), **TILT_OPTIONS)
-    frames = source.open(images)
+    frames = source.open(images, estimator.camera, names_each=False)
     check_apart(frames, out, beside=(motion.odometry, mounted.mask, camera.camera))
     moved = motion.motions_of(robot, frames)
     motions = moved.motions if moved is not None and moved.turns_known else None

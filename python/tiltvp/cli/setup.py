@@ -70,7 +70,7 @@ def setup(
     source = source.of_robot(known, recording)
     lens = camera.load(source.topic)
     mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
-    frames = source.open(recording)
+    frames = source.open(recording, lens, names_each=False)
     check_apart(frames, out, picture, mask_path(out), beside=(motion.odometry,))
     motion = motion.of_robot(known, frames)
     moved = motion.motions(frames)

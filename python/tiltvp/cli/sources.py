@@ -19,10 +19,10 @@ from tiltvp._core import WHEEL_BASE_MAX_M
 from tiltvp.cli.options import ABOVE_0, ALL_CORES, AtLeast0, given_words
 from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.terminal import complain
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
-    from tiltvp import Robot
+    from tiltvp import Robot, _core
     from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
 
 __all__ = [
@@ -68,10 +68,18 @@ class SourceOptions:
             return self
         return replace(self, topic=self.topic or robot.topics.get("images"))
 
-    def open(self, words: Sequence[str], *, topic_option: str = "--topic") -> Frames:
+    def open(
+        self,
+        words: Sequence[str],
+        camera: _core.Camera | None = None,
+        *,
+        topic_option: str = "--topic",
+        names_each: bool = True,
+    ) -> Frames:
         """The frames that words and options name; a line on stderr for each that is not there and for what is noted.
 
-        `topic_option` is what chooses the topic.
+        `topic_option` is what chooses the topic. `check_sizes` compares the frames with a `camera`, where the verb
+        `names_each` that cannot be read, or does not.
         """
         from tiltvp.streams import LiveCamera, NamedImages, RawImages, open_frames
         from tiltvp.streams.live import raw_size
@@ -88,6 +96,8 @@ class SourceOptions:
             return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
         frames = open_frames(list(words), topic=self.topic, option=topic_option)
         tell(*frames.problems, *frames.notes)
+        if camera is not None:
+            check_sizes(frames, camera, names_each=names_each)
         return frames
 
 
@@ -190,6 +200,51 @@ class MotionOptions:
 def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
     """The distance between the wheels that was given, or else that of a robot's file."""
     return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
+
+
+def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
+    """Looks at the headers of image files, and at the first frame of a video or recording, before any work is done.
+
+    A line on stderr for those of another size than the camera's, which are `told` of then; and, where nothing
+    `names_each` later, one for files that cannot be read. Raises `InvalidInputError` where all have another size, or
+    all that can be read.
+    """
+    from tiltvp.images import size_problem
+
+    unread, sized, sizes = list[str](), dict[str, str](), dict(_sizes(frames))
+    for name, size in sizes.items():
+        if isinstance(size, TiltvpError):
+            unread.append(str(size))
+        elif size is not None and size != (camera.width, camera.height):
+            sized[name] = f"{name}: {size_problem(size, camera)}"
+    lines = []
+    for such, what in (([] if names_each else unread, "read"), ([*sized.values()], "used for their size")):
+        if such:
+            of = f"{len(such)} of {len(sizes)} images cannot be {what}, first " if len(sizes) > 1 else ""
+            lines.append(of + such[0])
+    if sized and len(unread) + len(sized) == len(sizes):
+        raise InvalidInputError("; ".join(lines))
+    tell(*lines)
+    frames.told = sized.keys()
+
+
+def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:
+    """Name and (width, height) of each file, or of the first frame for all of another source; what is wrong with one
+    that cannot be read; and None for what is no regular file."""
+    from tiltvp.images import image_size
+    from tiltvp.streams.image_files import ImageFiles
+
+    if not isinstance(frames, ImageFiles):
+        for frame in frames.sample(range(1)) if frames.count else ():
+            image = frame.image
+            yield frame.name, None if isinstance(image, TiltvpError) else (image.shape[1], image.shape[0])
+        return
+    for name, file in zip(frames.names or (), frames.files, strict=True):
+        try:
+            special = file.exists() and not file.is_file()
+            yield name, None if special else image_size(file)
+        except TiltvpError as error:
+            yield name, error
 
 
 def check_apart(frames: Frames | None, *outputs: Path | None, beside: Sequence[Path | None]) -> None:

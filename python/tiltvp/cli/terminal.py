@@ -7,7 +7,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Final
@@ -179,13 +179,13 @@ def status(words: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def progress_bar(total: int, what: str, *, done: int = 0) -> Iterator[ProgressBar]:
+def progress_bar(total: int, what: str, *, done: int = 0, told: Collection[str] = ()) -> Iterator[ProgressBar]:
     """A bar with the time left on stderr for several things on a terminal, nothing otherwise; complaints go above it.
 
-    What was `done` before counts as done, and not for the time left.
+    What was `done` before counts as done, and not for the time left. Of names that were `told` of nothing is said.
     """
     if total < 2 or not sys.stderr.isatty():
-        yield ProgressBar(None)
+        yield ProgressBar(None, told)
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -194,19 +194,24 @@ def progress_bar(total: int, what: str, *, done: int = 0) -> Iterator[ProgressBa
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         progress.add_task(what, total=total, completed=done)
-        yield ProgressBar(progress)
+        yield ProgressBar(progress, told)
 
 
 class ProgressBar:
     """Counts what is done."""
 
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
+    def __init__(self, progress: Progress | None, told: Collection[str]) -> None:
+        self._progress, self._told = progress, told
 
     def advance(self) -> None:
         """One more is done."""
         if self._progress is not None:
             self._progress.advance(self._progress.task_ids[0])
+
+    def blame(self, name: object, problem: str) -> None:
+        """`complain` of what has a name, unless it was told of before."""
+        if str(name) not in self._told:
+            self.complain(named(name, problem))
 
     def complain(self, problem: str) -> None:
         """One line on stderr, above the bar."""

@@ -26,7 +26,7 @@ from tiltvp.cli.sources import (
     wheel_base_of,
 )
 from tiltvp.cli.tables import STDOUT, Out, json_lines
-from tiltvp.cli.terminal import complain, named, progress_bar, say, show, width
+from tiltvp.cli.terminal import complain, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
 from tiltvp.errors import InvalidInputError, counted
 from tiltvp.files import check_output_folder
@@ -102,7 +102,7 @@ def tilt(
     robot = camera.robot()
     source = source.of_robot(robot, images or [])
     estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load(source.topic))
-    frames = source.open(images or [])
+    frames = source.open(images or [], estimator.camera)
     check_apart(
         frames, overlay, level, out, filtering.filter_plot, beside=(motion.odometry, method.mask, camera.camera)
     )
@@ -234,10 +234,10 @@ def _done(work: Work, coming: Iterator[Frame], frames: Frames, threads: int) -> 
         return *named_frame, *work(*named_frame)
 
     # Of a live camera each frame is answered before the next comes.
-    with progress_bar(frames.count or 0, "images") as bar:
+    with progress_bar(frames.count or 0, "images", told=frames.told) as bar:
         done = map(one, named_frames) if threads == 1 else in_order(one, named_frames, threads)
         for frame, name, outcome, picture in done:
             if outcome.error is not None:
-                bar.complain(named(outcome.file, outcome.error))
+                bar.blame(outcome.file, outcome.error)
             bar.advance()
             yield frame, name, outcome, picture

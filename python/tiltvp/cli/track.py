@@ -21,7 +21,7 @@ from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
-from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
+from tiltvp.cli.terminal import ProgressBar, complain, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError, counted
 from tiltvp.files import check_output
 
@@ -97,7 +97,7 @@ def track(
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
     tracker = LineTracker(**place | tracking.given())
-    frames = frames_of.open(words)
+    frames = frames_of.open(words, lens)
     check_apart(frames, video, out, plot, beside=(motion.odometry, options.mask, camera.camera))
     motions = needed_turns(motion.motions_of(robot, frames))
     drive = Drive(extractor, tilt, motions)
@@ -141,7 +141,7 @@ def _follow(
 
     found: list[Seen] = []
     shown: Sequence[int] = ()
-    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
+    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames", told=frames.told) as bar:
         for frame, one in drive.seen(coming, bar):
             seen = one.followed(tracker)
             found.append((seen.number, frame.name, frame.time_s, seen.tracked))
@@ -248,7 +248,7 @@ class Drive:
                 self.repeated += 1
             elif seen is not _LEFT_OUT:
                 if isinstance(seen, TiltvpError):
-                    bar.complain(named(frame.name, str(seen)))
+                    bar.blame(frame.name, str(seen))
                     self.bad += 1
                 else:
                     yield frame, seen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -68,6 +68,8 @@ class Frames:
     """Sentences about the source that whoever uses it should know."""
     problems: tuple[str, ...] = ()
     """What was asked for and is not there, a sentence each."""
+    told: Collection[str] = ()
+    """Names of frames of which somebody has said what is wrong with them, so that it is not said again."""
     recording: Path | None = None
     """Where the odometry of the same drive is: a bag, or the table of a folder; None where nobody knows of any."""
 
