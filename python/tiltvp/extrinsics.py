@@ -29,7 +29,7 @@ CHILD_FRAMES: Final = ("camera_mount", "camera_optical")
 something."""
 _FALSE_ALARM: Final = 1e-3
 """How often logs that differ by chance alone, by their covariances, are said to contradict one another."""
-_START_SIGMA: Final = (0.3, 0.3, 0.5)
+START_SIGMA: Final = (0.3, 0.3, 0.5)
 """That of `tiltvp.calibrate`, by default."""
 _TRACE: Final = 1e-9
 """Of what drives have in common: so much each is taken to have by itself, so that one that has no more has a weight."""
@@ -215,7 +215,7 @@ def join_logs(
     logs: Sequence[LogCalibration],
     *,
     start: ArrayLike = (0.0, 0.0, 0.0),
-    start_sigma: ArrayLike = _START_SIGMA,
+    start_sigma: ArrayLike = START_SIGMA,
 ) -> JoinedLogs:
     """x, y and yaw of one camera from several logs, each weighed by its information.
 

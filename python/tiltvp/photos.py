@@ -18,9 +18,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
-    "PHOTO_TILT_MAX_RAD", "PanoramaKind", "encode_like", "jpeg_quality", "panorama_kind", "pose_deg", "with_pose",
+    "BELIEVED_MIN", "PHOTO_TILT_MAX_RAD", "PanoramaKind", "encode_like", "jpeg_quality", "panorama_kind", "pose_deg",
+    "with_pose",
 ]  # fmt: skip
 
+BELIEVED_MIN: Final = 0.5
+"""Least confidence of an image that is made level where no other is asked for: a tilt that is rather right than not."""
 PHOTO_TILT_MAX_RAD: Final = math.radians(60.0)
 """How far a 360-degree camera leans at most in a hand: without a limit three of 108 panoramas were taken, and believed,
 to lie on their side."""

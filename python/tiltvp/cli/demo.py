@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _RUNS: Final = 21
 _PANEL_PX: Final = 420
-_FIELD_OF_VIEW_DEG: Final = 185.0
+FIELD_OF_VIEW_DEG: Final = 185.0
 _FOCAL_PER_HEIGHT: Final = 139.7 / 480.0
 
 METHODS: Final[tuple[tuple[str, dict[str, Any]], ...]] = (
@@ -130,7 +130,7 @@ def _camera(width: int, height: int) -> Camera:
         focal_px=_FOCAL_PER_HEIGHT * height,
         cx=(width - 1) / 2.0,
         cy=(height - 1) / 2.0,
-        max_theta_rad=math.radians(_FIELD_OF_VIEW_DEG / 2.0),
+        max_theta_rad=math.radians(FIELD_OF_VIEW_DEG / 2.0),
     )
 
 

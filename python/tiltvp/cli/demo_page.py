@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.cli.level_images import BELIEVED_MIN
+from tiltvp.cli.demo import FIELD_OF_VIEW_DEG
 from tiltvp.cli.results import degrees
+from tiltvp.photos import BELIEVED_MIN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +38,6 @@ _FINER: Final = 2.0
 _NOISE: Final = 2.0
 """Grey levels, as `render_room` adds."""
 _METHOD: Final[dict[str, Any]] = {"method": "segments", "tilt_max_rad": math.radians(20.0)}
-_FIELD_OF_VIEW_DEG: Final = 185.0
 _TEMPLATE: Final = "demo_page.html"
 
 
@@ -69,7 +69,7 @@ def page(kind: str, seed: int, *, advance: Callable[[], None] = lambda: None) ->
 def _camera() -> Camera:
     from tiltvp import Camera
 
-    middle, reach = (SIDE_PX - 1) / 2.0, math.radians(_FIELD_OF_VIEW_DEG / 2.0)
+    middle, reach = (SIDE_PX - 1) / 2.0, math.radians(FIELD_OF_VIEW_DEG / 2.0)
     focal = (SIDE_PX / 2.0) / reach
     return Camera.equidistant(
         width=SIDE_PX, height=SIDE_PX, focal_px=focal, cx=middle, cy=middle, max_theta_rad=reach

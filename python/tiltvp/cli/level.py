@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 from cyclopts import Group, Parameter
 
@@ -19,12 +18,12 @@ from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, wheel_
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
+from tiltvp.levelling import View
 
 _OUTPUT = Group("What is shown")
 _METHOD_DEFAULTS, _FILTER_DEFAULTS = MethodOptions(), FilterOptions()
 _SOURCE, _MOTION = SourceOptions(), MotionOptions()
 _VIDEOS = (".mp4", ".avi")
-To: TypeAlias = Literal["same", "fisheye", "pinhole", "panorama"]
 
 
 @Parameter(name="*", group=_OUTPUT)
@@ -32,7 +31,7 @@ To: TypeAlias = Literal["same", "fisheye", "pinhole", "panorama"]
 class OutputOptions:
     """What level images show."""
 
-    to: To = "same"
+    to: View = "same"
     """The camera's own image, an equidistant fisheye's, a pinhole camera's, or a panorama of all directions."""
     size: str | None = None
     """WIDTHxHEIGHT of level images in pixels; by default the camera's, of panoramas as fine as it is."""

@@ -16,6 +16,7 @@ from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.images import read_mask
+from tiltvp.photos import BELIEVED_MIN
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frame, Motion
     from tiltvp.streams.image_files import ImageFiles
 
-BELIEVED_MIN: Final = 0.5
-"""Least confidence of an image that is made level where no other is asked for: a tilt that is rather right than not."""
 _WIDTH_PX: Final = 1024
 """Columns of a panorama in which edges are looked for. At 2,048 those of 108 panoramas tell the tilt no better, in
 three times the time (`tiltvp measure level`)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import Parameters
 
-_BROWN = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+BROWN = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _NEGLIGIBLE_SKEW_PX = 1e-9
 
 
@@ -42,14 +42,14 @@ def brown_conrady(node: Node | None) -> Parameters:
     values = node.numbers(0, 4, 5, 8, 12, 14)
     if any(values[8:]):
         node.refuse("thin prism or tilted sensor coefficients are not supported", "zeros after the eighth coefficient")
-    return dict(zip(_BROWN, values, strict=False))
+    return dict(zip(BROWN, values, strict=False))
 
 
 def mei(node: Node | None) -> Parameters:
     """k1 k2 p1 p2 [k3] on the plane z = 1 of the unified model."""
     if node is None:
         return {}
-    return dict(zip(_BROWN, node.numbers(0, 4, 5), strict=False))
+    return dict(zip(BROWN, node.numbers(0, 4, 5), strict=False))
 
 
 def kannala_brandt(node: Node, *more: int) -> Parameters:

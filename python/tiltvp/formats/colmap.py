@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tiltvp.errors import UnsupportedFormatError
+from tiltvp.formats.coefficients import BROWN
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
@@ -20,15 +21,14 @@ from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of
 _F: Final = ("f", "cx", "cy")
 _FXFY: Final = ("fx", "fy", "cx", "cy")
 _FOUR: Final = ("k1", "k2", "k3", "k4")
-_EIGHT: Final = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _SIDES: Final = ("width", "height")
 _MODELS: Final[dict[str, tuple[int, str, tuple[str, ...]]]] = {
     "SIMPLE_PINHOLE": (0, "pinhole", _F),
     "PINHOLE": (1, "pinhole", _FXFY),
     "SIMPLE_RADIAL": (2, "pinhole", (*_F, "k1")),
     "RADIAL": (3, "pinhole", (*_F, "k1", "k2")),
-    "OPENCV": (4, "pinhole", (*_FXFY, *_EIGHT[:4])),
-    "FULL_OPENCV": (6, "pinhole", (*_FXFY, *_EIGHT)),
+    "OPENCV": (4, "pinhole", (*_FXFY, *BROWN[:4])),
+    "FULL_OPENCV": (6, "pinhole", (*_FXFY, *BROWN)),
     "OPENCV_FISHEYE": (5, "kannala_brandt", (*_FXFY, *_FOUR)),
     "SIMPLE_RADIAL_FISHEYE": (8, "kannala_brandt", (*_F, "k1")),
     "RADIAL_FISHEYE": (9, "kannala_brandt", (*_F, "k1", "k2")),

@@ -20,7 +20,7 @@ __all__ = ["GAP_MAX_S", "Motion", "Odometry", "Travelled", "gaps_told"]
 GAP_MAX_S: Final = 0.5
 """Longest time between two samples that is interpolated. A robot that changes its speed by 1 m/s in a second is then at
 most 1 * 0.5^2 / 8 = 3 cm from where the straight line between the samples has it."""
-_SAME_S: Final = 1e-6
+SAME_S: Final = 1e-6
 """Times closer than this are one: seconds since 1970 are told to 2.4e-7 s by a float, and clocks to less."""
 _ASIDE_M: Final = 0.05
 _ASIDE_SHARE: Final = 0.03
@@ -174,8 +174,8 @@ class Odometry:
             raise InvalidInputError(f"times_s: shape {times.shape}, expected (M,)")
         after = np.clip(np.searchsorted(self.times_s, times), 1, len(self.times_s) - 1)
         low, high = self.times_s[after - 1], self.times_s[after]
-        outside = ~((times >= self.times_s[0] - _SAME_S) & (times <= self.times_s[-1] + _SAME_S))
-        at_sample = np.minimum(np.abs(times - low), np.abs(times - high)) <= _SAME_S
+        outside = ~((times >= self.times_s[0] - SAME_S) & (times <= self.times_s[-1] + SAME_S))
+        at_sample = np.minimum(np.abs(times - low), np.abs(times - high)) <= SAME_S
         in_gap = ~outside & ~at_sample & (high - low > self.gap_max_s)
         share = (np.clip(times, low, high) - low) / (high - low)
         share[outside | in_gap] = np.nan

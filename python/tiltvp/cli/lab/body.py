@@ -33,7 +33,6 @@ def body(
 
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.body import (
-        CAMERAS,
         IMAGES,
         PLACES,
         drives,
@@ -42,6 +41,7 @@ def body(
         summarise_masks,
         summarise_tilts,
     )  # fmt: skip
+    from tiltvp.lab.evaluation.mounting import CAMERAS
 
     found = [] if directory is None else read_panorama_index(directory)
     buildings = list({panorama.location: panorama for panorama in found}.values())

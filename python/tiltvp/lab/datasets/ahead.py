@@ -15,10 +15,12 @@ from tiltvp.rotations import read_rotation
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["AHEAD_CAMERAS", "AheadView", "ahead_views", "roll_pitch", "up_from"]
+__all__ = ["AHEAD_CAMERAS", "FORWARD", "AheadView", "ahead_views", "roll_pitch", "up_from"]
 
 WIDTH, HEIGHT = 640, 480
 LEAN_MAX_DEG: Final = 45.0
+FORWARD: Final = read_rotation("forward")
+"""The mounting of a camera that looks ahead, (3, 3)."""
 
 
 def _pinhole(view_deg: float) -> Camera:
@@ -69,12 +71,11 @@ def ahead_views(
 ) -> Iterator[AheadView]:
     """One view of a panorama by each camera; heading, roll and pitch, up to so much, by the seed `number`."""
     rng = np.random.default_rng(number)
-    forward = read_rotation("forward")
     for place, (name, camera) in enumerate(AHEAD_CAMERAS.items()):
         yaw = float(rng.uniform(-np.pi, np.pi))
         roll, pitch = np.deg2rad(rng.uniform(-lean_max_deg, lean_max_deg, 2))
         up = up_from(roll, pitch)
-        views = PanoramaViews(panorama, camera, robot_from_camera=forward, samples=samples)
+        views = PanoramaViews(panorama, camera, robot_from_camera=FORWARD, samples=samples)
         seed = 1000 * number + place
-        image = views.render(forward @ up, yaw_rad=yaw, noise_sigma=noise_sigma, seed=seed)
+        image = views.render(FORWARD @ up, yaw_rad=yaw, noise_sigma=noise_sigma, seed=seed)
         yield AheadView(name, image, up)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from tiltvp.cameras import Camera
-from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
 from tiltvp.lab.datasets.degrading import degrade_image
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.rotations import read_rotation
@@ -27,7 +27,6 @@ __all__ = ["CASES", "UNHARMED", "HostileImage", "centre_off", "focal_off", "host
 LEAN_MAX_DEG: Final = 8.0
 """Leans are drawn up to this: the default method looks for 10."""
 UP: Final = read_rotation("up")
-FORWARD: Final = read_rotation("forward")
 DOWN: Final = np.diag([1.0, -1.0, -1.0])
 ROLLED: Final = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """A quarter turn about the optical axis: portrait for landscape."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.extrinsics import START_SIGMA
 from tiltvp.synth import SimulatedDrive, simulate_drive
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ BASE_M: Final = 0.4
 SIGMA_RAD: Final = math.radians(0.5)
 K_M: Final = 1e-5
 """The robot of Scaramuzza, Siegwart and Martinelli 2009, and the noise that the defaults assume."""
-START_SIGMA: Final = (0.3, 0.3, 0.5)
-"""What the defaults assume about the mounting at the start, which is drawn accordingly."""
 RHO_M: Final = (0.05, 0.35)
 YAW_SIGMA_RAD: Final = 0.3
 TOO_SHORT: Final = 15

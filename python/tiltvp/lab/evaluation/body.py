@@ -12,11 +12,11 @@ import polars as pl
 
 from tiltvp.body import body_mask
 from tiltvp.cameras import Camera
-from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
 from tiltvp.lab.datasets.body import PaintedBody
 from tiltvp.lab.datasets.driving import drive_room
-from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
-from tiltvp.rotations import read_rotation
+from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
+from tiltvp.lab.evaluation.mounting import CAMERAS
+from tiltvp.robot_setup import LOOKED_AT
 from tiltvp.synth import Drive
 from tiltvp.tilt import TiltEstimate, TiltEstimator, normal_from_alpha_beta, tilt_error_rad
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PLACES", "DriveImages", "drives", "judge_drive", "panorama_sets", "summarise_masks", "summarise_tilts"]
 
-IMAGES: Final = 24
+IMAGES: Final = LOOKED_AT
 FEWER: Final = (5, 12, 24)
 """Images that are looked at, spread over the drive."""
 FRAMES: Final = 400
@@ -33,10 +33,6 @@ FRAMES: Final = 400
 BUMPS_RAD: Final = 0.04
 PLACES: Final = ("corridor", "office", "living-room", "corridor, straight on")
 """Where drives go: they wander, but for the last, which goes on by five metres without a turn or a bump."""
-CAMERAS: Final = {
-    "up": (paper_camera(), read_rotation("up")),
-    "ahead": (AHEAD_CAMERAS["pinhole 80"], read_rotation("forward")),
-}
 METHODS: Final = ("refined", "segments")
 _GRADIENT: Final = 150.0
 """Least magnitude of the edges that are counted, for the Scharr kernel (3, 10, 3): that of the methods."""

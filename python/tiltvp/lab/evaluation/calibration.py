@@ -13,6 +13,7 @@ import polars as pl
 
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.hostile_drives import BASE_M
 from tiltvp.selfcalib import MountingEstimate, SelfCalibrator, calibrate
 from tiltvp.synth import simulate_drive
 
@@ -35,7 +36,6 @@ START_ERRORS = (0.34, 0.03, 0.33)
 """Standard deviations of the errors of phi, rho, psi at the start."""
 START_SIGMA = (0.2, 0.2, 0.6)
 """What the default filter is told about its start, as x, y, yaw."""
-_BASE_M = 0.4
 _CENSI_LANDMARKS = 10
 _CENSI_EVERY = 4
 """Steps for each look: the scan matcher's noise makes a path longer than it was, and the map's scale, which the wheels
@@ -53,7 +53,7 @@ def simulated_drives(kind: str, method: str, runs: int, *, advance: Callable[[],
     by_plane = _polar_by_plane(_TRUE_PLANE)
     rows = []
     for seed in range(runs):
-        drive = simulate_drive(kind, seed=seed, wheel_base_m=_BASE_M)
+        drive = simulate_drive(kind, seed=seed, wheel_base_m=BASE_M)
         *_, e = _estimates(drive, method, seed)
         bound = drive.cramer_rao_bound(start_sigma=START_SIGMA)
         error = np.array([e.x_m, e.y_m, e.yaw_rad]) - _TRUE_PLANE
@@ -82,7 +82,7 @@ def _estimates(drive: SimulatedDrive, method: str, seed: int) -> Iterator[Mounti
     if method == "paper":
         j = np.linalg.inv(_polar_by_plane(start))
         sigma = j @ np.diag(np.square(START_ERRORS)) @ j.T
-    calibrator = SelfCalibrator(wheel_base_m=_BASE_M, start=start, start_sigma=sigma, method=method)
+    calibrator = SelfCalibrator(wheel_base_m=BASE_M, start=start, start_sigma=sigma, method=method)
     bearings = drive.bearings
     ends = np.searchsorted(bearings[:, 0], np.arange(len(drive.odometry) + 1))
     for (left, right), a, b in zip(drive.odometry, ends[:-1], ends[1:], strict=True):
@@ -101,7 +101,7 @@ def convergence(
     """
     errors, path = [], np.zeros(0)
     for seed in range(runs):
-        drive = simulate_drive(kind, seed=seed, landmarks=lines, wheel_base_m=_BASE_M)
+        drive = simulate_drive(kind, seed=seed, landmarks=lines, wheel_base_m=BASE_M)
         found = np.array([[e.x_m, e.y_m, e.yaw_rad] for e in _estimates(drive, "default", seed)])
         errors.append(found - _TRUE_PLANE)
         path = np.cumsum(np.abs(drive.odometry.mean(axis=1)))

@@ -15,8 +15,8 @@ from tiltvp.colmap import ColmapDatabase, ImageGravity, image_gravities
 from tiltvp.errors import MissingExtraError
 from tiltvp.formats import write_cameras
 from tiltvp.images import write_image
+from tiltvp.lab.datasets.ahead import FORWARD
 from tiltvp.photos import PHOTO_TILT_MAX_RAD
-from tiltvp.rotations import rotation_from
 from tiltvp.synth import Room
 from tiltvp.tilt import TiltEstimator, normal_from_alpha_beta
 
@@ -32,7 +32,6 @@ LEAN_MAX_DEG: Final = 20.0
 _WALK_M: Final = 0.5
 """Views are from places within so much of one, a full turn of headings: enough is seen of each by its neighbours."""
 _HEIGHT_M: Final = (1.1, 1.5)
-_FORWARD: Final = rotation_from("forward", "the mounting")
 _SEED: Final = 0
 """Of whatever COLMAP draws. By default it draws matches anew in every run, and its threads add in any order: sums that
 differ by rounding end in other reconstructions. With the seed and one thread the same views give the same numbers."""
@@ -88,12 +87,12 @@ def _render(camera: Camera, kind: str, seed: int, folder: Path, views: int, adva
         pose = (*(np.array([x, y]) + rng.uniform(-_WALK_M, _WALK_M, 2)), 2.0 * math.pi * number / views)
         alpha, beta = math.radians(rng.uniform(0.0, LEAN_MAX_DEG)), rng.uniform(-math.pi, math.pi)
         view = room.render(
-            camera, pose=pose, alpha_rad=alpha, beta_rad=beta, robot_from_camera=_FORWARD,
+            camera, pose=pose, alpha_rad=alpha, beta_rad=beta, robot_from_camera=FORWARD,
             camera_height_m=rng.uniform(*_HEIGHT_M), samples=1, seed=number,
         )  # fmt: skip
         name = f"{number:03d}.png"
         write_image(folder / name, view.bgr)
-        truth[name] = -np.asarray(normal_from_alpha_beta(alpha, beta)) @ _FORWARD
+        truth[name] = -np.asarray(normal_from_alpha_beta(alpha, beta)) @ FORWARD
         advance()
     return truth
 

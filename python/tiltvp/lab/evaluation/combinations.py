@@ -27,11 +27,11 @@ __all__ = [
 
 Group = Literal["paper", "literal", "beyond"]
 
-_RANSAC, _REJECT, _CONSENSUS, _REFINED, _SEGMENTS = (
+RANSAC, REJECT, CONSENSUS, _REFINED, _SEGMENTS = (
     "image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined", "segments",
 )  # fmt: skip
 
-PAPER_METHODS: Final = (_RANSAC, _REJECT, _CONSENSUS)
+PAPER_METHODS: Final = (RANSAC, REJECT, CONSENSUS)
 """The methods of the paper, whose angles corrections are trained for."""
 
 PIXEL_METHODS: Final = (*PAPER_METHODS, _REFINED)
@@ -67,25 +67,25 @@ class Combination:
 
 def _ransac(gradient_min: float, threshold_px: float) -> Combination:
     options = {"gradient_min": gradient_min, "threshold_px": threshold_px, "correction": None}
-    return Combination(_RANSAC, f"image-space RANSAC, I_min {gradient_min:g}, {threshold_px:g} px", "paper", options)
+    return Combination(RANSAC, f"image-space RANSAC, I_min {gradient_min:g}, {threshold_px:g} px", "paper", options)
 
 
 def _reject(gradient_min: float, keep_fraction: float) -> Combination:
     options = {"gradient_min": gradient_min, "keep_fraction": keep_fraction, "correction": None}
     label = f"image-space reject-refit, I_min {gradient_min:g}, Q {keep_fraction:g}"
-    return Combination(_REJECT, label, "paper", options)
+    return Combination(REJECT, label, "paper", options)
 
 
 def _literal(gradient_min: float, rejected: float) -> Combination:
     options = {"gradient_min": gradient_min, "keep_fraction": round(1.0 - rejected, 6), "correction": None}
     label = f"image-space reject-refit, I_min {gradient_min:g}, Q {rejected:g} read as rejected"
-    return Combination(_REJECT, label, "literal", options)
+    return Combination(REJECT, label, "literal", options)
 
 
 def _consensus(gradient_min: float, threshold_deg: float) -> Combination:
     options = {"gradient_min": gradient_min, "threshold_rad": math.radians(threshold_deg), "correction": None}
     label = f"vector consensus, I_min {gradient_min:g}, {threshold_deg:g} deg"
-    return Combination(_CONSENSUS, label, "paper", options)
+    return Combination(CONSENSUS, label, "paper", options)
 
 
 def _varied(combination: Combination, words: str, **options: Any) -> Combination:

@@ -11,7 +11,7 @@ import polars as pl
 from tiltvp._core import ComplementaryFilter
 from tiltvp.corner_images import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError, MissingExtraError
-from tiltvp.rotations import ROTATION_WORDS
+from tiltvp.lab.datasets.ahead import FORWARD
 from tiltvp.streams import InertialSamples
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ _TIME_CONSTANTS_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 _INTEGRAL_SHARE: Final = 0.05
 """Integral gain of the explicit complementary filter, in shares of its proportional one."""
 
-_FORWARD: Final = np.array(ROTATION_WORDS["forward"])
-"""From a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z upwards."""
+# `FORWARD` is from a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z
+# upwards.
 _WALLS: Final = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
 """From such a frame along a room's walls to the world's."""
 
@@ -104,14 +104,14 @@ def compare_inertial(
     for method, seen in by_time.items():
         if seen:
             frames = np.array(list(seen))
-            images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
+            images = np.stack([FORWARD @ a.T @ FORWARD.T for a in seen.values()])
             poses = sequence.poses_at(frames)
             at_frames = _board_angles(_level(poses, corner.world_from_object))
             walls = _board_angles(_level(poses, _WALLS))[:, 2] if method.startswith(_GRAY) else None
             tables.append(_errors(method, frames, _board_angles(images), at_frames, walls))
     fused = filter_attitudes(imu, by_time[IMAGE])
     known = np.isfinite(fused).all(axis=(1, 2))
-    level = np.einsum("ij,njk,lk->nil", _FORWARD, fused[known], _FORWARD)
+    level = np.einsum("ij,njk,lk->nil", FORWARD, fused[known], FORWARD)
     tables.append(_errors("gyroscope + image", imu.times_s[known], _board_angles(level), truth[known]))
     for method in CONVENTIONAL:
         every = [conventional_angles(imu, method, tau)[known] for tau in _TIME_CONSTANTS_S]
@@ -164,7 +164,7 @@ def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDA
         raise MissingExtraError("ahrs: not installed, expected `pip install 'tiltvp[imu]'`") from error
 
     step_s = float(np.median(np.diff(imu.times_s)))
-    rates, forces = imu.rates_rad_s @ _FORWARD.T, imu.forces_m_s2 @ _FORWARD.T
+    rates, forces = imu.rates_rad_s @ FORWARD.T, imu.forces_m_s2 @ FORWARD.T
     if method == "complementary":
         gain = time_constant_s / (time_constant_s + step_s)
         angles = np.array(Complementary(gyr=rates, acc=forces, frequency=1.0 / step_s, gain=gain).W, dtype=np.float64)
@@ -181,7 +181,7 @@ def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDA
 def _level(poses: NDArray[np.float64], world_from_object: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 3, 3): rotations of the board in the levelled object frame, from `world_from_left`."""
     camera = np.einsum("ji,njk->nik", world_from_object, poses[:, :3, :3])
-    level: NDArray[np.float64] = np.einsum("ij,njk,lk->nil", _FORWARD, camera, _FORWARD)
+    level: NDArray[np.float64] = np.einsum("ij,njk,lk->nil", FORWARD, camera, FORWARD)
     return level
 
 

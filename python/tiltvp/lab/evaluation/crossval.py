@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Event
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import polars as pl
 
 from tiltvp._core import (
     AffineCorrection,
-    PosteriorCorrection,
     apply_correction,
     normal_from_alpha_beta,
     train_affine,
     train_factor,
     train_posterior,
 )
+from tiltvp.corrections import Correction
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.combinations import PAPER_METHODS
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["TRAINED", "cross_validated"]
 
-
-_Correction: TypeAlias = "float | AffineCorrection | PosteriorCorrection"
 
 TRAINED: Final = ("factor", "affine", "posterior")
 """The corrections that are trained: a of eq. 30 or a' of eq. 45, a and b of section 4, P(alpha | l) of section 5.1."""
@@ -97,7 +95,7 @@ def _folds(places: list[str], most: int | None) -> list[list[str]]:
     return [places[first::count] for first in range(count)]
 
 
-def _trained(kind: str, measured: NDArray[np.float64], true: NDArray[np.float64]) -> _Correction | None:
+def _trained(kind: str, measured: NDArray[np.float64], true: NDArray[np.float64]) -> Correction | None:
     """The correction that a training set gives; None where it does not determine one."""
     try:
         match kind:

@@ -14,11 +14,11 @@ import polars as pl
 
 from tiltvp.cameras import Camera
 from tiltvp.images import gray_from, read_image
+from tiltvp.lab.datasets.ahead import FORWARD
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.lab.evaluation.imu import InertialPanorama, against_sensor
 from tiltvp.levelling import Leveller
-from tiltvp.photos import PHOTO_TILT_MAX_RAD, encode_like
-from tiltvp.rotations import rotation_from
+from tiltvp.photos import BELIEVED_MIN, PHOTO_TILT_MAX_RAD, encode_like
 from tiltvp.tilt import TiltEstimate, TiltEstimator, normal_from_alpha_beta, tilt_error_rad
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ __all__ = ["lean_against_sensor", "photo_times", "remap_times", "summarise_turne
 _METHODS: Final = (("segments", 1024), ("segments", 2048), ("refined", 1024))
 """What is compared: a method, and the columns of the panorama that it is given."""
 _LARGEST_DEG: Final = 30.0
-_BELIEVED_MIN: Final = 0.5
-_FORWARD: Final = rotation_from("forward", "the mounting")
 _WIDTH: Final = 2048
 _QUALITY: Final = 90
 """Of JPEG photographs: what cameras write."""
@@ -46,11 +44,11 @@ def _estimator(method: str, width: int) -> TiltEstimator:
     """Of panoramas of that width that look ahead; refined starts upright, with a gate as wide as need be."""
     camera = _panorama_camera(width)
     if method == "segments":
-        return TiltEstimator(camera, method=method, robot_from_camera=_FORWARD, tilt_max_rad=PHOTO_TILT_MAX_RAD)
+        return TiltEstimator(camera, method=method, robot_from_camera=FORWARD, tilt_max_rad=PHOTO_TILT_MAX_RAD)
     return TiltEstimator(
         camera,
         method=method,
-        robot_from_camera=_FORWARD,
+        robot_from_camera=FORWARD,
         elevation_min_rad=-math.pi / 4,
         tilt_max_rad=math.radians(_LARGEST_DEG + 5.0),
     )
@@ -74,7 +72,7 @@ def turned_panoramas(
     for panorama in panoramas:
         alpha, beta, yaw = math.radians(rng.uniform(0.0, _LARGEST_DEG)), *rng.uniform(-math.pi, math.pi, 2)
         truth = normal_from_alpha_beta(alpha, beta)
-        views = PanoramaViews(panorama, _panorama_camera(_WIDTH), robot_from_camera=_FORWARD, samples=1)
+        views = PanoramaViews(panorama, _panorama_camera(_WIDTH), robot_from_camera=FORWARD, samples=1)
         image = views.render(truth, yaw_rad=yaw, noise_sigma=0.0)
         for (method, width), one in zip(_METHODS, estimators, strict=True):
             begin = time.process_time()
@@ -99,7 +97,7 @@ def summarise_turned(table: pl.DataFrame) -> pl.DataFrame:
     """Errors in degrees of those that are believed, from a confidence of 0.5 on, and how many they are."""
     rows = []
     for (method,), part in table.group_by(["method"], maintain_order=True):
-        believed = part.filter(pl.col("error_deg").is_finite() & (pl.col("confidence") >= _BELIEVED_MIN))
+        believed = part.filter(pl.col("error_deg").is_finite() & (pl.col("confidence") >= BELIEVED_MIN))
         errors = believed["error_deg"].to_numpy()
         rows.append(
             {
@@ -140,7 +138,7 @@ def remap_times(*, seed: int = 0, advance: Callable[[], None] = lambda: None) ->
     cases: list[tuple[str, Camera, NDArray[np.float64] | None]] = [
         ("fisheye, 640 x 480", paper_camera(), None),
         ("OCam, 640 x 480", ocam, None),
-        ("panorama, 2048 x 1024", _panorama_camera(_WIDTH), _FORWARD),
+        ("panorama, 2048 x 1024", _panorama_camera(_WIDTH), FORWARD),
     ]
     rows = []
     with _one_thread():
@@ -171,7 +169,7 @@ def photo_times(panoramas: Sequence[Panorama], *, advance: Callable[[], None] = 
     The median of the photographs for each step, and for all steps together; tables of the camera are ready.
     """
     camera = _panorama_camera(_WIDTH)
-    estimator, leveller = _estimator("segments", 1024), Leveller(camera, _FORWARD)
+    estimator, leveller = _estimator("segments", 1024), Leveller(camera, FORWARD)
     rows = []
     with _one_thread():
         for panorama in panoramas:

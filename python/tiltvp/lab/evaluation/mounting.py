@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
-from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
@@ -31,7 +31,7 @@ __all__ = ["CAMERAS", "CASES", "judge_mountings", "summarise_findings", "summari
 
 CAMERAS: Final = {
     "up": (paper_camera(), read_rotation("up")),
-    "ahead": (AHEAD_CAMERAS["pinhole 80"], read_rotation("forward")),
+    "ahead": (AHEAD_CAMERAS["pinhole 80"], FORWARD),
 }
 CASES: Final = {"level": (0.0, 0.0), "1 degree": (1.0, 0.0), "1 degree, bumps": (1.0, 1.0)}
 """Floors by name: slope and greatest lean from bumps, degrees."""

@@ -12,6 +12,7 @@ from tiltvp._core import tilt_error_rad
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import rotation_from_quaternion
 from tiltvp.streams import Recording
+from tiltvp.streams.odometry import SAME_S
 from tiltvp.streams.outputs.tilts import TILT_TOPIC
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     Rows = NDArray[np.float64]
 
 __all__ = ["RecordedTruth", "TiltErrors"]
-
-_SAME_S = 1e-6
-"""Stamps within it are of one frame: a time in seconds as a float64 is known to 2e-7 s today."""
 
 
 class TiltErrors(NamedTuple):
@@ -69,10 +67,10 @@ class RecordedTruth(NamedTuple):
 
     def tilt_errors(self, path: str | os.PathLike[str]) -> TiltErrors:
         """Of the attitudes that `tiltvp tilt --out FILE.mcap` wrote, frame by frame."""
-        normals = {round(stamp_s / _SAME_S): normal for stamp_s, normal in zip(self.times_s, self.normals, strict=True)}
+        normals = {round(stamp_s / SAME_S): normal for stamp_s, normal in zip(self.times_s, self.normals, strict=True)}
         errors = []
         for stamp_s, answer in _messages(Recording(path), TILT_TOPIC):
-            near = round(stamp_s / _SAME_S)
+            near = round(stamp_s / SAME_S)
             true = next((normals[key] for key in (near, near - 1, near + 1) if key in normals), None)
             if true is None:
                 raise InvalidInputError(f"{os.fspath(path)}: a tilt at {stamp_s:.6f} s, expected those of the frames")

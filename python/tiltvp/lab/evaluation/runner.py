@@ -30,7 +30,7 @@ T = TypeVar("T")
 _EDGE_OPTIONS = ("gradient_min", "smoothing_px", "elevation_min_rad", "elevation_max_rad", "margin_px", "row_stride")
 """What edge pixels depend on beside the camera, its mounting and the mask."""
 
-_PARAMETERS = ("gradient_min", "keep_fraction", "threshold_px", "threshold_rad")
+VARIED = ("gradient_min", "keep_fraction", "threshold_px", "threshold_rad")
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _constant_columns(
     """The columns that do not depend on the image."""
     kinds = ["closed-form" if each.options.get("correction") == "closed-form" else "none" for each in combinations]
     nothing: list[object] = [None] * len(combinations)
-    columns: dict[str, Sequence[object]] = {name: [each.get(name) for each in options] for name in _PARAMETERS}
+    columns: dict[str, Sequence[object]] = {name: [each.get(name) for each in options] for name in VARIED}
     return columns | {
         "combination": range(len(combinations)),
         "method": [each.method for each in combinations],

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
+from tiltvp.lab.datasets.ahead import FORWARD
 from tiltvp.lab.datasets.hostile import (
     AHEAD,
     DOWN,
-    FORWARD,
     LEAN_MAX_DEG,
     ROLLED,
     UP,

@@ -12,6 +12,7 @@ import polars as pl
 from tiltvp.errors import RunError, TiltvpError
 from tiltvp.lab.datasets.folder import read_dataset
 from tiltvp.lab.evaluation import curves
+from tiltvp.lab.evaluation.runner import VARIED
 from tiltvp.lab.evaluation.runs import Run
 from tiltvp.lab.evaluation.summary import errors
 from tiltvp.lab.evaluation.variants import best_rows, variant_points
@@ -26,7 +27,6 @@ __all__ = ["OtherRun", "contents_of", "scaling_of"]
 
 _REJECT: Final = "image space, reject-refit"
 _ERROR_MAX_DEG: Final = 3.0
-_IN_TABLE: Final = ("gradient_min", "keep_fraction", "threshold_px", "threshold_rad")
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _factors(table: pl.DataFrame, rows: pl.DataFrame) -> dict[str, float]:
     trained = table.filter((pl.col("correction") == "factor") & (pl.col("group") == "paper"))
     factors = {}
     for method, parameters in PARAMETERS.items():
-        same = [pl.col(name) == value for name, value in parameters.items() if name in _IN_TABLE]
+        same = [pl.col(name) == value for name, value in parameters.items() if name in VARIED]
         own, best = (
             part.filter(pl.col("method") == method, *more)["factor"].mean()
             for part, more in ((trained, same), (rows, ()))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.lab.evaluation.combinations import CONSENSUS, RANSAC, REJECT
 from tiltvp.lab.plots.report.histograms import OffsetPanel, offset_panels
 from tiltvp.lab.plots.report.normals import NormalPanel, normal_panels
 from tiltvp.lab.plots.report.pixels import SeenEdges, consensus_pixels, pixels_and_offsets, prefiltered_pixels
@@ -27,14 +28,13 @@ if TYPE_CHECKING:
 
 __all__ = ["PARAMETERS", "Lens", "example_panels"]
 
-_RANSAC, _REJECT, _CONSENSUS = "image-space-ransac", "image-space-reject-refit", "vector-consensus"
 _SHOWN: Final = 500
 _RANSAC_COLOUR: Final = "#e69f00"
 
 PARAMETERS: Final[dict[str, dict[str, Any]]] = {
-    _REJECT: {"gradient_min": 200.0, "keep_fraction": 0.8, "correction": None},
-    _RANSAC: {"gradient_min": 200.0, "threshold_px": 5.0, "correction": None},
-    _CONSENSUS: {
+    REJECT: {"gradient_min": 200.0, "keep_fraction": 0.8, "correction": None},
+    RANSAC: {"gradient_min": 200.0, "threshold_px": 5.0, "correction": None},
+    CONSENSUS: {
         "gradient_min": 200.0, "threshold_rad": math.radians(3.5), "tilt_max_rad": math.radians(7.0),
         "normal": "gradient", "correction": None,
     },
@@ -77,7 +77,7 @@ class Lens:
         estimator = TiltEstimator(self.dataset.camera, method=method, **(options | mounting))
         return *estimator.with_edges(gray), estimator.options
 
-    def true_cosine(self, chosen: Chosen, method: str = _REJECT) -> Cosine:
+    def true_cosine(self, chosen: Chosen, method: str = REJECT) -> Cosine:
         """The cosine predicted from the true tilt by the factor of a method."""
         normal = normal_from_alpha_beta(chosen.alpha_true_rad, chosen.beta_true_rad)
         shift = self.factors_px.get(method, math.nan) * chosen.alpha_true_rad
@@ -109,7 +109,7 @@ def _typical(lens: Lens, pair: Sequence[Chosen], grays: Sequence[NDArray[np.uint
     seen, histograms = [], []
     limit = 0.0
     for letter, chosen, gray in zip("ab", pair, grays, strict=True):
-        _, edges, options = lens.edges(_REJECT, gray)
+        _, edges, options = lens.edges(REJECT, gray)
         limit = max(limit, _limit_px(options, edges))
         seen.append(SeenEdges(gray, edges, f"({letter}) {chosen.words}"))
         picked = edges.prefiltered
@@ -133,7 +133,7 @@ def _typical(lens: Lens, pair: Sequence[Chosen], grays: Sequence[NDArray[np.uint
             "figure-11", "Figure 11",
             "Gradient direction φ and edge offset s of the edge pixels of figure 10, as histograms: darker bins hold "
             "more pixels. The red, dashed line is the cosine predicted from the true tilt with the trained factor a "
-            f"({lens.factors_px[_REJECT]:.0f} pixels per radian), the thin dashed line is s = 0.",
+            f"({lens.factors_px[REJECT]:.0f} pixels per radian), the thin dashed line is s = 0.",
             offset_panels(histograms, offset_max_px=limit),
         ),
     ]  # fmt: skip
@@ -144,19 +144,19 @@ def _disturbed(lens: Lens, candidates: Sequence[Chosen]) -> list[Panel]:
     gray = lens.gray(chosen)
 
     def panel(
-        title: str, estimate: TiltEstimate, edges: EdgeElements, picked: NDArray[np.bool_], method: str = _REJECT
+        title: str, estimate: TiltEstimate, edges: EdgeElements, picked: NDArray[np.bool_], method: str = REJECT
     ) -> OffsetPanel:
         cosines = (lens.true_cosine(chosen, method), lens.fitted_cosine(estimate, "least-squares fit"))
         return OffsetPanel(title, edges.phi_rad[picked], edges.offset_px[picked], cosines)
 
-    plain, everything, options = lens.edges(_REJECT, gray, max_iterations=0)
-    sampled, sampled_edges, _ = lens.edges(_RANSAC, gray)
-    early, early_edges, _ = lens.edges(_REJECT, gray, max_iterations=2)
-    late, late_edges, _ = lens.edges(_REJECT, gray)
-    limit, threshold = _limit_px(options, everything), PARAMETERS[_RANSAC]["threshold_px"]
+    plain, everything, options = lens.edges(REJECT, gray, max_iterations=0)
+    sampled, sampled_edges, _ = lens.edges(RANSAC, gray)
+    early, early_edges, _ = lens.edges(REJECT, gray, max_iterations=2)
+    late, late_edges, _ = lens.edges(REJECT, gray)
+    limit, threshold = _limit_px(options, everything), PARAMETERS[RANSAC]["threshold_px"]
     twelve = [
         panel("(a) nothing rejected", plain, everything, everything.prefiltered),
-        panel(f"(b) after RANSAC, {threshold:g} px", sampled, sampled_edges, sampled_edges.inlier, _RANSAC),
+        panel(f"(b) after RANSAC, {threshold:g} px", sampled, sampled_edges, sampled_edges.inlier, RANSAC),
     ]
     rounds = max(late.report.iterations - 1, 0)
     fourteen = [
@@ -166,7 +166,7 @@ def _disturbed(lens: Lens, candidates: Sequence[Chosen]) -> list[Panel]:
     ]  # fmt: skip
     apart = [
         _words(_apart_px(lens, chosen, estimate, method))
-        for estimate, method in ((plain, _REJECT), (sampled, _RANSAC), (early, _REJECT), (late, _REJECT))
+        for estimate, method in ((plain, REJECT), (sampled, RANSAC), (early, REJECT), (late, REJECT))
     ]
     return [
         Panel(
@@ -197,13 +197,13 @@ def _disturbed(lens: Lens, candidates: Sequence[Chosen]) -> list[Panel]:
 def _gain_px(lens: Lens, chosen: Chosen) -> float:
     """By how much both ways of rejecting pixels bring the vanishing point nearer to the true one than no rejection."""
     gray = lens.gray(chosen)
-    plain = _apart_px(lens, chosen, lens.edges(_REJECT, gray, max_iterations=0)[0])
-    mended = [_apart_px(lens, chosen, lens.edges(method, gray)[0], method) for method in (_REJECT, _RANSAC)]
+    plain = _apart_px(lens, chosen, lens.edges(REJECT, gray, max_iterations=0)[0])
+    mended = [_apart_px(lens, chosen, lens.edges(method, gray)[0], method) for method in (REJECT, RANSAC)]
     gain = plain - max(mended)
     return gain if math.isfinite(gain) else -math.inf
 
 
-def _apart_px(lens: Lens, chosen: Chosen, estimate: TiltEstimate, method: str = _REJECT) -> float:
+def _apart_px(lens: Lens, chosen: Chosen, estimate: TiltEstimate, method: str = REJECT) -> float:
     """How far apart the vanishing points of the fitted and the true cosine are."""
     true, fit = lens.true_cosine(chosen, method), lens.fitted_cosine(estimate)
     shifts = [cosine.shift_px * np.exp(1j * cosine.direction_rad) for cosine in (true, fit)]
@@ -223,7 +223,7 @@ def _words(pixels: float) -> str:
 
 
 def _normals(lens: Lens, pair: Sequence[Chosen], grays: Sequence[NDArray[np.uint8]]) -> list[Panel]:
-    runs = [lens.edges(_CONSENSUS, gray) for gray in grays]
+    runs = [lens.edges(CONSENSUS, gray) for gray in grays]
     edges = runs[0][1]
     generator = np.random.default_rng(0)
     arrows = []
@@ -260,8 +260,8 @@ def _normals(lens: Lens, pair: Sequence[Chosen], grays: Sequence[NDArray[np.uint
 
 def _worst(lens: Lens, chosen: Chosen) -> Panel:
     gray = lens.gray(chosen)
-    refit, edges, options = lens.best_edges(_REJECT, gray)
-    sampled, _, _ = lens.best_edges(_RANSAC, gray)
+    refit, edges, options = lens.best_edges(REJECT, gray)
+    sampled, _, _ = lens.best_edges(RANSAC, gray)
     picked, limit = edges.prefiltered, _limit_px(options, edges)
     cosines = (
         lens.true_cosine(chosen), lens.fitted_cosine(refit, "reject-refit"),
