@@ -16,7 +16,7 @@ from dask.distributed import LocalCluster
 
 from evaluations import evaluated, same_bytes
 from tiltvp.cli import main
-from tiltvp.errors import RunError
+from tiltvp.errors import MissingExtraError, RunError
 from tiltvp.lab.cluster import results_of
 from tiltvp.lab.datasets.folder import TiltDataset
 from tiltvp.lab.evaluation import cluster as module
@@ -123,5 +123,5 @@ def test_what_is_lost_in_the_middle(
 
 def test_without_dask(tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
-    with pytest.raises(RunError, match=r"pip install 'tiltvp\[cluster\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'tiltvp\[cluster\]'"):
         evaluated(dataset, tmp_path / "run", cluster=NOBODY)

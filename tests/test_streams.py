@@ -283,12 +283,15 @@ def test_without_the_extras(package: str, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, package, None)
     if package == "av":
         frames = open_frames(video)
-        assert "tiltvp[video]" in frames.notes[0]
+        needed = "reading its time stamps needs the extra video (av: not installed)"
+        assert frames.notes[0].endswith(f"frames a second; {needed}, expected `pip install 'tiltvp[video]'`")
         assert np.diff(frames.times_s) == pytest.approx([1 / frames.rate_hz] * 2)
         assert [abs(int(frame.read()[5, 5, 0]) - 20 * k) < 8 for k, frame in enumerate(frames)] == [True] * 3
     else:
-        with pytest.raises(MissingExtraError, match=r"tiltvp\[bags\]"):
+        with pytest.raises(MissingExtraError, match=r"tiltvp\[bags\]") as refusal:
             open_frames(bag)
+        needed = f"{bag}: a recording of ROS needs the extra bags (rosbags: not installed)"
+        assert str(refusal.value) == f"{needed}, expected `pip install 'tiltvp[bags]'`"
 
 
 def test_a_drive_s_folder_and_times_of_images(tmp_path: Path) -> None:

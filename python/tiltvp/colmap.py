@@ -77,7 +77,8 @@ class ColmapDatabase:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path_from(path)
         _check_database(self.path)
-        with _pycolmap(self.path).Database.open(str(self.path)) as opened:
+        self._what = f"{self.path}: a database of COLMAP"
+        with import_pycolmap(self._what).Database.open(str(self.path)) as opened:
             known = {_key(prior.corr_data_id): prior for prior in opened.read_all_pose_priors()}
             cameras = opened.read_all_cameras()
             self.cameras: dict[int, CameraSpec | str] = {
@@ -110,7 +111,7 @@ class ColmapDatabase:
 
         All of it is written or nothing. Raises `OutputError`.
         """
-        pycolmap = _pycolmap(self.path)
+        pycolmap = import_pycolmap(self._what)
         try:
             with pycolmap.Database.open(str(self.path)) as opened:
                 known = {_key(prior.corr_data_id): prior for prior in opened.read_all_pose_priors()}
@@ -251,16 +252,15 @@ def _check_database(path: Path) -> None:
         )
 
 
-def _pycolmap(path: Path) -> Any:
+def import_pycolmap(what: str) -> Any:
+    """The package, for `what`. Raises `MissingExtraError` where it is missing or too old."""
     try:
         import pycolmap
     except ImportError as error:
-        raise MissingExtraError(f"{path}: a database of COLMAP, expected `pip install 'tiltvp[colmap]'`") from error
+        raise MissingExtraError.of(what, "colmap", error) from error
     if not hasattr(pycolmap.PosePrior, "gravity"):
         version = getattr(pycolmap, "__version__", "that is installed")
-        raise MissingExtraError(
-            f"pycolmap {version}: its priors have no gravity, expected `pip install 'tiltvp[colmap]'`"
-        )
+        raise MissingExtraError.of(what, "colmap", f"pycolmap {version}: its priors have no gravity")
     return pycolmap
 
 

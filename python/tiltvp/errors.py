@@ -1,6 +1,6 @@
 """The exceptions of the package: everything it raises on purpose derives from `TiltvpError`."""
 
-from typing import Final
+from typing import Final, Self
 
 LONGEST_MESSAGE: Final = 2_000
 """Characters of a message: what was given may be in it, and a file may give megabytes. A path may have 4,096 bytes, of
@@ -61,6 +61,13 @@ class RunError(TiltvpError, RuntimeError):
 
 class MissingExtraError(TiltvpError, ImportError):
     """Something needs packages that are installed with an extra, such as `tiltvp[lab]`."""
+
+    @classmethod
+    def of(cls, what: str, extra: str, problem: ImportError | str) -> Self:
+        """`what` needs an extra, with what is wrong with its packages: they are not there, or cannot be imported."""
+        if isinstance(problem, ModuleNotFoundError) and problem.name:
+            problem = f"{problem.name.partition('.')[0]}: not installed"
+        return cls(f"{what} needs the extra {extra} ({problem}), expected `pip install 'tiltvp[{extra}]'`")
 
 
 class InternalError(TiltvpError, RuntimeError):

@@ -11,6 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltvp.errors import MissingExtraError
+
 if TYPE_CHECKING:
     from av.container import InputContainer
 
@@ -39,8 +41,9 @@ def add_sound(
         return None
     try:
         import av
-    except ImportError:
-        return f"{apart or 'its sound, if it has any, is not copied'}, expected `pip install 'tiltvp[video]'`"
+    except ImportError as error:
+        told = apart or "its sound, if it has any, is not copied"
+        return f"{told}; {MissingExtraError.of('what keeps sound and times', 'video', error)}"
     if source is None and own is not None:
         own = [time_s - own[0] for time_s in own]
     joined = scratch / f"joined{path.suffix}"

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, OutputError
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["VideoWriter", "video_writer"]
 
-_CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
+CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG"}
+"""Of videos that are written, by their endings."""
 
 
 class VideoWriter:
@@ -44,7 +45,7 @@ class VideoWriter:
 
         if self._writer is None:
             self._shape = image.shape
-            code = cv2.VideoWriter.fourcc(*_CODECS[self._path.suffix.lower()])
+            code = cv2.VideoWriter.fourcc(*CODECS[self._path.suffix.lower()])
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate_hz, (image.shape[1], image.shape[0]))
             if not self._writer.isOpened():
                 raise OutputError(f"{self._name}: cannot be written (OpenCV opens no such video there)")
@@ -71,8 +72,8 @@ def video_writer(
     Raises `InvalidInputError` for other endings, `OutputError` where it cannot be written.
     """
     file = path_from(path)
-    if file.suffix.lower() not in _CODECS:
-        raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(_CODECS)}")
+    if file.suffix.lower() not in CODECS:
+        raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(CODECS)}")
     with whole_file(file) as part:
         writer = VideoWriter(part, rate_hz, file)
         try:

@@ -23,7 +23,6 @@ from tiltvp.levelling import View
 _OUTPUT = Group("What is shown")
 _METHOD_DEFAULTS, _FILTER_DEFAULTS = MethodOptions(), FilterOptions()
 _SOURCE, _MOTION = SourceOptions(), MotionOptions()
-_VIDEOS = (".mp4", ".avi")
 
 
 @Parameter(name="*", group=_OUTPUT)
@@ -132,10 +131,11 @@ def _is_video(out: Path) -> bool:
     """Whether a video is written, not a folder. Raises `InvalidInputError` for the name of a file that is neither's."""
     from tiltvp.streams.image_files import IMAGE_ENDINGS
     from tiltvp.streams.video_files import VIDEO_ENDINGS
+    from tiltvp.videos import CODECS
 
     ending = out.suffix.lower()
-    if out.is_dir() or ending not in (*_VIDEOS, *VIDEO_ENDINGS, *IMAGE_ENDINGS):
+    if out.is_dir() or ending not in (*CODECS, *VIDEO_ENDINGS, *IMAGE_ENDINGS):
         return False
-    if ending not in _VIDEOS:
-        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected {' or '.join(_VIDEOS)}, or a folder")
+    if ending not in CODECS:
+        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected {' or '.join(CODECS)}, or a folder")
     return True

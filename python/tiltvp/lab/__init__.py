@@ -16,4 +16,4 @@ def _is_missing(package: str) -> bool:
 
 _missing = [package for package in ("polars", "matplotlib") if _is_missing(package)]
 if _missing:
-    raise MissingExtraError(f"{' and '.join(_missing)}: not installed, expected `pip install 'tiltvp[lab]'`")
+    raise MissingExtraError.of("the laboratory", "lab", f"{' and '.join(_missing)}: not installed")

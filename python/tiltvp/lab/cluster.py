@@ -11,7 +11,7 @@ from importlib import import_module
 from itertools import islice
 from typing import Any, Final, TypeVar
 
-from tiltvp.errors import RunError
+from tiltvp.errors import MissingExtraError, RunError
 
 __all__ = ["results_of"]
 
@@ -37,8 +37,8 @@ def results_of(
 ) -> Iterator[tuple[int, Made]]:
     """The numbers of the chunks and what `task(job, chunk)` made of each, as they come.
 
-    Raises `RunError` if Dask is not installed, the scheduler does not answer, has no workers or has gone, and where a
-    task has ended one worker after the other.
+    Raises `MissingExtraError` if Dask is not installed, `RunError` if the scheduler does not answer, has no workers or
+    has gone, and where a task has ended one worker after the other.
     """
     distributed = _dask()
     client = _client(distributed, address)
@@ -101,8 +101,7 @@ def _dask() -> Any:
     try:
         return import_module("dask.distributed")
     except ImportError as error:
-        hint = "pip install 'tiltvp[cluster]'"
-        raise RunError(f"a cluster needs Dask, which is not installed ({error}), expected it: {hint}") from error
+        raise MissingExtraError.of("a cluster", "cluster", error) from error
 
 
 def _client(distributed: Any, address: str) -> Any:

@@ -135,7 +135,7 @@ class Recording:
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
         except ImportError as error:
-            raise MissingExtraError(f"{self.path}: a bag, expected `pip install 'tiltvp[bags]'`") from error
+            raise MissingExtraError.of(f"{self.path}: a recording of ROS", "bags", error) from error
         self._check()
         try:
             # Before Iron the bags of ROS 2 do not say what their types are.

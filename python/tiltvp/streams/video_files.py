@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp import _core
-from tiltvp.errors import ImageFileError, TiltvpError, counted
+from tiltvp.errors import ImageFileError, MissingExtraError, TiltvpError, counted
 from tiltvp.streams.frames import DEFAULT_RATE_HZ, Frame, Frames, median_rate_hz
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def open_video(path: Path) -> Frames:
         raise ImageFileError(f"{path}: no such file, expected a video")
     try:
         import av  # noqa: F401
-    except ImportError:
-        return _OpenCvVideo(path)
+    except ImportError as error:
+        return _OpenCvVideo(path, error)
     return _Video(path)
 
 
@@ -210,7 +210,7 @@ def _decoded(container: Any) -> Iterator[av.VideoFrame]:
 class _OpenCvVideo(Frames):
     """A video by OpenCV, which tells no time stamps that can be relied upon: its frames are taken to be even."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, without: ImportError) -> None:
         import cv2
 
         self.source, self._path = str(path), path
@@ -225,8 +225,8 @@ class _OpenCvVideo(Frames):
         self.times_s = np.arange(count) / self.rate_hz
         self.names = _names(path, count)
         self.notes = (
-            f"{path}: read without its time stamps, as {self.rate_hz:.6g} even frames a second; "
-            "`pip install 'tiltvp[video]'` reads them",
+            f"{path}: read as {self.rate_hz:.6g} even frames a second; "
+            f"{MissingExtraError.of('reading its time stamps', 'video', without)}",
         )
 
     def _capture(self) -> Any:

@@ -30,8 +30,9 @@ def estimate_on_cluster(
 ) -> Iterator[tuple[int, pl.DataFrame]]:
     """The rows of these images as they come, from the workers of the Dask scheduler at `address`.
 
-    The workers read the dataset from its path; it has to be the same there. Raises `RunError` if Dask is not installed,
-    the scheduler does not answer or has no workers, and if a worker has another version or another dataset.
+    The workers read the dataset from its path; it has to be the same there. Raises `MissingExtraError` if Dask is
+    not installed, `RunError` if the scheduler does not answer or has no workers, and if a worker has another version or
+    another dataset.
     """
     job = json.dumps(
         {

@@ -11,8 +11,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp.cameras import Camera
-from tiltvp.colmap import ColmapDatabase, ImageGravity, image_gravities
-from tiltvp.errors import MissingExtraError
+from tiltvp.colmap import ColmapDatabase, ImageGravity, image_gravities, import_pycolmap
 from tiltvp.formats import write_cameras
 from tiltvp.images import write_image
 from tiltvp.lab.datasets.ahead import FORWARD
@@ -45,7 +44,7 @@ def reconstruct_room(
     An image's gravity by a reconstruction is the direction that is (0, 1, 0) in its world, COLMAP's down. `advance` is
     called per view and way. The new `folder` keeps images and database. Raises `MissingExtraError` without pycolmap.
     """
-    pycolmap = _pycolmap()
+    pycolmap = import_pycolmap("a reconstruction by COLMAP")
     pycolmap.logging.minloglevel = pycolmap.logging.ERROR.value
     pycolmap.set_random_seed(_SEED)
     camera = Camera.pinhole(width=640, height=480, fx=320.0, fy=320.0, cx=319.5, cy=239.5)
@@ -67,14 +66,6 @@ def reconstruct_room(
     errors = [_angle_deg(one.gravity, truth[one.image.name]) for one in found if one.gravity is not None]
     rows.append({"room": f"{kind} {seed}", "way": "the priors themselves", "views": views} | _summary(errors))
     return pl.DataFrame(rows)
-
-
-def _pycolmap() -> Any:
-    try:
-        import pycolmap
-    except ImportError as error:
-        raise MissingExtraError("pycolmap: not installed, expected `pip install 'tiltvp[colmap]'`") from error
-    return pycolmap
 
 
 def _render(camera: Camera, kind: str, seed: int, folder: Path, views: int, advance: Callable[[], None]) -> Truth:

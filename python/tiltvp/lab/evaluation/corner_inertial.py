@@ -161,7 +161,7 @@ def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDA
     try:
         from ahrs.filters import Complementary, Mahony  # type: ignore[import-untyped]
     except ImportError as error:
-        raise MissingExtraError("ahrs: not installed, expected `pip install 'tiltvp[imu]'`") from error
+        raise MissingExtraError.of("a conventional filter", "imu", error) from error
 
     step_s = float(np.median(np.diff(imu.times_s)))
     rates, forces = imu.rates_rad_s @ FORWARD.T, imu.forces_m_s2 @ FORWARD.T

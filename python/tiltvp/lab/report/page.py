@@ -24,7 +24,7 @@ def page_of(contents: Contents, pictures: Mapping[str, bytes]) -> str:
         import jinja2
         import plotly.offline  # type: ignore[import-untyped]
     except ImportError as error:
-        raise MissingExtraError(f"{error}, expected `pip install 'tiltvp[lab]'`") from error
+        raise MissingExtraError.of("the page of a report", "lab", error) from error
     panels = [item for section in contents.sections for item in section.items if isinstance(item, Panel)]
     figures = {panel.stem: panel.web for panel in panels if panel.web is not None}
     environment = jinja2.Environment(

@@ -102,8 +102,8 @@ def check_recording(path: str | os.PathLike[str]) -> None:
         raise InvalidInputError(f"{name}: expected a name that ends in {_ENDING}")
     try:
         import rosbags.rosbag2  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(f"{error.name}: not installed, expected `pip install 'tiltvp[bags]'`") from None
+    except ImportError as error:
+        raise MissingExtraError.of(f"{name}: a recording of ROS", "bags", error) from None
     check_output(path)
 
 

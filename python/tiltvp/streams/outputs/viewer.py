@@ -48,7 +48,7 @@ def _rerun() -> Any:
     try:
         import rerun
     except ImportError as error:
-        raise MissingExtraError(f"{error}, expected `pip install 'tiltvp[rerun]'`") from None
+        raise MissingExtraError.of("the viewer of Rerun", "rerun", error) from None
     return rerun
 
 
