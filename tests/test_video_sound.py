@@ -12,6 +12,7 @@ import pytest
 
 import tiltvp
 from recordings import START_S, Bag
+from tiltvp.errors import ImageFileError
 from tiltvp.streams import open_frames
 from tiltvp.synth import RoomImage
 from tiltvp.videos import video_writer
@@ -134,3 +135,14 @@ def test_a_source_that_is_no_video_is_told(tmp_path: Path) -> None:
         video.add(np.zeros((64, 64, 3), np.uint8), 0.0)
     assert "its sound (of unknown kind) is not copied" in (video.note or "")
     assert open_frames(tmp_path / "out.mp4").count == 1
+
+
+def test_codecs_that_nobody_knows_are_told(tmp_path: Path) -> None:
+    data = film(tmp_path / "known.mkv", EVEN_S, "pcm_s16le").read_bytes()
+    (tmp_path / "heard.mkv").write_bytes(data.replace(b"A_PCM/INT/LIT", b"A_UNKNOWN/LIT"))
+    with video_writer(tmp_path / "out.mp4", sound_of=tmp_path / "heard.mkv") as video:
+        video.add(np.zeros((64, 64, 3), np.uint8), 0.0)
+    assert video.note == "its sound (of unknown kind) is not copied into .mp4 (its codec is not known)"
+    (tmp_path / "seen.mkv").write_bytes(data.replace(b"V_MPEG4/ISO/ASP", b"V_UNKNOWN/ISO/A"))
+    with pytest.raises(ImageFileError, match=r"seen.mkv: cannot be decoded, for its codec is not known"):
+        open_frames(tmp_path / "seen.mkv")

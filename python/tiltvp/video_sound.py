@@ -52,7 +52,10 @@ def add_sound(
         # As for frames, a name with a colon is no address.
         film = nullcontext(None) if source is None else av.open(f"file:{os.fspath(source)}")
         with film as heard, av.open(str(path)) as seen:
-            copied = [] if heard is None else [stream.codec_context.name for stream in heard.streams.audio]
+            sounds = [] if heard is None else heard.streams.audio
+            if any(stream.codec_context is None for stream in sounds):
+                raise ValueError("its codec is not known")
+            copied = [stream.codec_context.name for stream in sounds]
             if copied:
                 apart = _apart(known, rate_hz, what="sound")
             if not copied and (own is None or apart is None):

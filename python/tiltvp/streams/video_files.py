@@ -145,6 +145,8 @@ def _opened(path: Path) -> Iterator[Any]:
         with av.open(f"file:{os.fspath(path)}") as container:
             if not container.streams.video:
                 raise ImageFileError(f"{path}: no video stream, expected a video")
+            if container.streams.video[0].codec_context is None:
+                raise ImageFileError(f"{path}: {_DAMAGED}, for its codec is not known, expected another, as H.264")
             container.streams.video[0].thread_type = "AUTO"
             yield container
     except TiltvpError:
