@@ -104,3 +104,24 @@ def test_a_size_is_read_from_the_header_alone(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(data[:2] + comments + data[2:])
     assert image_size(tmp_path / "a.jpg") == (240, 180)
     assert open_frames(tmp_path / "a.jpg").told == ()
+
+
+@pytest.mark.parametrize("verb", AT_ONCE)
+def test_what_is_no_image_at_all_is_told_once(run: Run, folder: Path, verb: str) -> None:
+    said = run(*verb.split(), "wheels.csv", "--camera", "camera.toml")
+    assert (said.code, said.out) == (2, "")
+    assert "wheels.csv: not an image that can be decoded" in said.complaint
+    # What comes only once is nothing for these verbs.
+    assert "Unknown option: --live" in run(*verb.split(), "images", "--camera", "camera.toml", "--live", 0).complaint
+    assert "-: comes only once" in run(*verb.split(), "-", "--camera", "camera.toml").complaint
+
+
+@pytest.mark.parametrize("of", ["images", "film.avi"])
+def test_images_that_are_no_panoramas_are_not_levelled_one_by_one(run: Run, folder: Path, of: str) -> None:
+    film = cv2.VideoWriter(str(folder / "film.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (240, 180))
+    film.write(np.zeros((180, 240, 3), np.uint8))
+    film.release()
+    said = run("level", of, "--out", "level")
+    assert (said.code, said.out) == (2, "")
+    assert "240 x 180 pixels, and no --camera, expected one, or 360-degree panoramas" in said.complaint
+    assert not (folder / "level").exists()

@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import CameraOptions, Switch, given_words
-from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
+from tiltvp.cli.sources import KeptOptions, MotionOptions, ending_at_interrupt
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
 from tiltvp.cli.track import Drive, needed_turns, tell_jumps, track_table
@@ -104,7 +104,7 @@ class PictureLog:
             raise InvalidInputError(f"{source}: pictures without --camera, expected the camera's calibration")
         if pictures.tracks is not None:
             check_ending(pictures.tracks)
-        looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
+        looked = KeptOptions(topic=pictures.topic).of_robot(robot, [source])
         lens = camera.load(looked.topic)
         frames = looked.open([source], lens)
         lines.extractor(lens), lines.tilts(lens)  # Refuses options before there is any work.

@@ -11,6 +11,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
+from tiltvp.cli.frame_sizes import check_panoramas
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
@@ -101,6 +102,8 @@ def level(
     if cluster is None or not is_begun(out / TILTS):
         check_output(out) if as_video else check_output_folder(out)
     frames = source.open(images or [], looks.camera)
+    if looks.camera is None:
+        check_panoramas(frames)
     of_files = isinstance(frames, ImageFiles)
     path = out if as_video or of_files else out / f"{Path(frames.source).stem}.mp4"
     calibration = None if camera is None else camera.camera

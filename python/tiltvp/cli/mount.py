@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tiltvp.cli.options import ABOVE_0, CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
+from tiltvp.cli.sources import KeptOptions, MotionOptions, check_apart
 from tiltvp.cli.tables import check_file, finite
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.files import write_whole
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DONE, FAILED, NOT_TOLD = 0, 1, 3
 _MOUNTED = MountedOptions()
-_SOURCE = SourceOptions()
+_SOURCE = KeptOptions()
 _MOTION = MotionOptions()
 
 
@@ -29,7 +29,7 @@ def mount(
     /,
     *,
     camera: CameraOptions,
-    source: SourceOptions = _SOURCE,
+    source: KeptOptions = _SOURCE,
     mounted: MountedOptions = _MOUNTED,
     motion: MotionOptions = _MOTION,
     level_floor: Switch = False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
+from tiltvp.cli.sources import KeptOptions, MotionOptions, check_apart
 from tiltvp.cli.tables import PICTURES, check_file
 from tiltvp.cli.terminal import complain, files_first, progress_bar, say
 from tiltvp.files import check_output
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tiltvp.robot_setup import RobotSetup
     from tiltvp.streams import Frames
 
-_SOURCE = SourceOptions()
+_SOURCE = KeptOptions()
 _MOTION = MotionOptions()
 
 
@@ -29,7 +29,7 @@ def setup(
     *,
     camera: CameraOptions,
     out: Path,
-    source: SourceOptions = _SOURCE,
+    source: KeptOptions = _SOURCE,
     motion: MotionOptions = _MOTION,
     robot_from_camera: str | None = None,
     mask: Path | None = None,

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Final, Self, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import WHEEL_BASE_MAX_M
+from tiltvp.cli.frame_sizes import check_sizes
 from tiltvp.cli.options import ABOVE_0, ALL_CORES, AtLeast0, given_words
 from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.terminal import complain
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from tiltvp import Robot, _core
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "STDIN",
+    "KeptOptions",
     "MotionOptions",
     "SourceOptions",
     "check_apart",
@@ -50,15 +52,11 @@ _SOURCE = Group("Source", help="Images, a video, or a recording of ROS: docs/rec
 
 @Parameter(name="*", group=_SOURCE)
 @dataclass(frozen=True, kw_only=True)
-class SourceOptions:
-    """Where frames come from, where the words do not tell."""
+class KeptOptions:
+    """Where frames come from that can be read again, where the words do not tell."""
 
     topic: str | None = None
     """The topic of a recording's images, where it has several."""
-    live: AtLeast0 | None = None
-    """A camera by its number, in place of files; Ctrl-C ends it."""
-    raw: str | None = None
-    """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
 
     def of_robot(self, robot: Robot | None, words: Sequence[str]) -> Self:
         """With the topic that a robot's file names, where the words name a recording and the topic is not given."""
@@ -81,7 +79,37 @@ class SourceOptions:
         `topic_option` is what chooses the topic. `check_sizes` compares the frames with a `camera`, where the verb
         `names_each` that cannot be read, or does not.
         """
-        from tiltvp.streams import LiveCamera, NamedImages, RawImages, open_frames
+        from tiltvp.streams import open_frames
+
+        if list(words) == [STDIN]:
+            raise InvalidInputError("-: comes only once, expected images, a video or a recording")
+        frames = open_frames(list(words), topic=self.topic, option=topic_option)
+        tell(*frames.problems, *frames.notes)
+        if camera is not None:
+            check_sizes(frames, camera, names_each=names_each)
+        return frames
+
+
+@Parameter(name="*", group=_SOURCE)
+@dataclass(frozen=True, kw_only=True)
+class SourceOptions(KeptOptions):
+    """Where frames come from, where the words do not tell."""
+
+    live: AtLeast0 | None = None
+    """A camera by its number, in place of files; Ctrl-C ends it."""
+    raw: str | None = None
+    """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
+
+    def open(
+        self,
+        words: Sequence[str],
+        camera: _core.Camera | None = None,
+        *,
+        topic_option: str = "--topic",
+        names_each: bool = True,
+    ) -> Frames:
+        """The same, and what comes only once."""
+        from tiltvp.streams import LiveCamera, NamedImages, RawImages
         from tiltvp.streams.live import raw_size
 
         if self.live is not None and words:
@@ -94,11 +122,7 @@ class SourceOptions:
             raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
         if list(words) == [STDIN]:
             return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
-        frames = open_frames(list(words), topic=self.topic, option=topic_option)
-        tell(*frames.problems, *frames.notes)
-        if camera is not None:
-            check_sizes(frames, camera, names_each=names_each)
-        return frames
+        return super().open(words, camera, topic_option=topic_option, names_each=names_each)
 
 
 @Parameter(name="*", group=Group("Odometry"))
@@ -200,51 +224,6 @@ class MotionOptions:
 def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
     """The distance between the wheels that was given, or else that of a robot's file."""
     return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
-
-
-def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
-    """Looks at the headers of image files, and at the first frame of a video or recording, before any work is done.
-
-    A line on stderr for those of another size than the camera's, which are `told` of then; and, where nothing
-    `names_each` later, one for files that cannot be read. Raises `InvalidInputError` where all have another size, or
-    all that can be read.
-    """
-    from tiltvp.images import size_problem
-
-    unread, sized, sizes = list[str](), dict[str, str](), dict(_sizes(frames))
-    for name, size in sizes.items():
-        if isinstance(size, TiltvpError):
-            unread.append(str(size))
-        elif size is not None and size != (camera.width, camera.height):
-            sized[name] = f"{name}: {size_problem(size, camera)}"
-    lines = []
-    for such, what in (([] if names_each else unread, "read"), ([*sized.values()], "used for their size")):
-        if such:
-            of = f"{len(such)} of {len(sizes)} images cannot be {what}, first " if len(sizes) > 1 else ""
-            lines.append(of + such[0])
-    if sized and len(unread) + len(sized) == len(sizes):
-        raise InvalidInputError("; ".join(lines))
-    tell(*lines)
-    frames.told = sized.keys()
-
-
-def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:
-    """Name and (width, height) of each file, or of the first frame for all of another source; what is wrong with one
-    that cannot be read; and None for what is no regular file."""
-    from tiltvp.images import image_size
-    from tiltvp.streams.image_files import ImageFiles
-
-    if not isinstance(frames, ImageFiles):
-        for frame in frames.sample(range(1)) if frames.count else ():
-            image = frame.image
-            yield frame.name, None if isinstance(image, TiltvpError) else (image.shape[1], image.shape[0])
-        return
-    for name, file in zip(frames.names or (), frames.files, strict=True):
-        try:
-            special = file.exists() and not file.is_file()
-            yield name, None if special else image_size(file)
-        except TiltvpError as error:
-            yield name, error
 
 
 def check_apart(frames: Frames | None, *outputs: Path | None, beside: Sequence[Path | None]) -> None:

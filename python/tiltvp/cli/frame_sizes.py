@@ -1,0 +1,70 @@
+"""Whether frames have the size that they must have, told before any work is done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from tiltvp.cli.terminal import complain
+from tiltvp.errors import InvalidInputError, TiltvpError
+
+if TYPE_CHECKING:
+    from tiltvp import _core
+    from tiltvp.streams import Frames
+
+__all__ = ["check_panoramas", "check_sizes"]
+
+
+def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
+    """Looks at the headers of image files, and at the first frame of a video or recording, before any work is done.
+
+    A line on stderr for those of another size than the camera's, which are `told` of then; and, where nothing
+    `names_each` later, one for files that cannot be read, told of too. Raises `InvalidInputError` where none is left,
+    unless all cannot be read and each will be named.
+    """
+    from tiltvp.images import size_problem
+
+    unread, sized, sizes = dict[str, str](), dict[str, str](), dict(_sizes(frames))
+    for name, size in sizes.items():
+        if isinstance(size, TiltvpError):
+            unread[name] = str(size)
+        elif size is not None and size != (camera.width, camera.height):
+            sized[name] = f"{name}: {size_problem(size, camera)}"
+    lines = []
+    for such, what in (({} if names_each else unread, "read"), (sized, "used for their size")):
+        if such:
+            of = f"{len(such)} of {len(sizes)} images cannot be {what}, first " if len(sizes) > 1 else ""
+            lines.append(of + next(iter(such.values())))
+    if (sized or not names_each) and 0 < len(sizes) == len(unread) + len(sized):
+        raise InvalidInputError("; ".join(lines))
+    for line in lines:
+        complain(line)
+    frames.told = sized.keys() if names_each else sized.keys() | unread.keys()
+
+
+def check_panoramas(frames: Frames) -> None:
+    """Raises `InvalidInputError` where no image is twice as wide as high, as 360-degree panoramas are."""
+    sizes = [(name, size) for name, size in _sizes(frames) if not isinstance(size, TiltvpError)]
+    for name, size in sizes[:1]:
+        if size is not None and all(each is not None and each[0] != 2 * each[1] for _, each in sizes):
+            found = f"{name}: {size[0]} x {size[1]} pixels, and no --camera"
+            raise InvalidInputError(f"{found}, expected one, or 360-degree panoramas, twice as wide as high")
+
+
+def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:
+    """Name and (width, height) of each file, or of the first frame for all of another source; what is wrong with one
+    that cannot be read; and None for what is no regular file."""
+    from tiltvp.images import image_size
+    from tiltvp.streams.image_files import ImageFiles
+
+    if not isinstance(frames, ImageFiles):
+        for frame in frames.sample(range(1)) if frames.count else ():
+            image = frame.image
+            yield frame.name, None if isinstance(image, TiltvpError) else (image.shape[1], image.shape[0])
+        return
+    for name, file in zip(frames.names or (), frames.files, strict=True):
+        try:
+            special = file.exists() and not file.is_file()
+            yield name, None if special else image_size(file)
+        except TiltvpError as error:
+            yield name, error
