@@ -107,6 +107,7 @@ def panoramas(tmp_path: Path) -> Path:
         (["corners", "--frames", "5"], "frames = 5, expected 10 or more"),
         (["corners-real", "nowhere"], "truth_cam_poses.txt: no such file"),
         (["level", "--out", "x.csv"], "expected a folder of panoramas"),
+        (["level", "nowhere"], "nowhere/INDEX.csv: cannot be read"),
         (["level", "--every", "2"], "expected a folder of panoramas or --inertial"),
         (["sampling", "--seeds", "0"], "--seeds"),
         (["views", "PANORAMAS"], "panoramas of one building"),

@@ -69,3 +69,9 @@ def test_the_command_names_images_without_one(tmp_path: Path, capsys: pytest.Cap
     told = capsys.readouterr().err
     assert "none.png: no circle" in told
     assert "missing.png" in told
+    none.unlink()
+    assert main(["camera", "rim", str(tmp_path)]) == 0
+    assert "seen.png" in capsys.readouterr().out
+    seen.unlink()
+    assert main(["camera", "rim", str(tmp_path)]) == 2
+    assert "a folder without images" in capsys.readouterr().err

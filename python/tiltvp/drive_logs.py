@@ -182,7 +182,8 @@ def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str =
     for name in names:
         count = table.header.count(name)
         if count != 1 and not (name == optional and count == 0):
-            raise InvalidInputError(f"{table.where(1)}: column {name!r} {count} times, expected {expected}")
+            found = f"column {name!r} {count} times" if count else f"no column {name!r}"
+            raise InvalidInputError(f"{table.where(1)}: {found}, expected {expected}")
     return table, {name: table.header.index(name) for name in names if name in table.header}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -66,6 +67,10 @@ class DriveOptions(LibraryOptions):
         base = wheel_base_of(robot, wheel_base)
         if base is None:
             raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
+        for option, given in (("--start", self.start), ("--start-sigma", self.start_sigma)):
+            if given is not None and abs(given[2]) > 2.0 * math.pi:
+                degrees = f"{given[2]:g} degrees are {math.radians(given[2]):.4g}"
+                raise InvalidInputError(f"{option}: a yaw of {given[2]:g} radians, expected at most 2 pi; {degrees}")
         place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m
         return replace(self, wheel_base=base, start=self.start or (*place, 0.0))
 

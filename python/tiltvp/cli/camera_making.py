@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from tiltvp.cli.camera import FileOptions, app, built
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import ABOVE_0, Switch, image_size_from
+from tiltvp.cli.sources import KeptOptions
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.files import check_output
@@ -30,7 +31,7 @@ _READING = FileOptions()
 
 
 @app.command
-def rim(images: list[Path], /) -> int:
+def rim(images: list[str], /) -> int:
     """Find the circle of a mirror's or a lens' rim in images, for `camera new`, and for `lines --rim-radius-px`.
 
     The exit code is 1 if an image shows none well enough, or cannot be read.
@@ -38,26 +39,27 @@ def rim(images: list[Path], /) -> int:
     Parameters
     ----------
     images
-        Images of a camera that stands still, or single ones.
+        Images, folders of images and glob patterns, or a video.
     """
-    from tiltvp.images import read_image
     from tiltvp.rim import rim_circle
 
+    frames = KeptOptions().open(images)
     table = new_table(None, ("file", "centre u px", "centre v px", "radius px", "covered %"), ("file",))
-    well = True
-    for file in images:
+    well = not frames.problems
+    for frame in frames:
         try:
-            found = rim_circle(read_image(file))
+            found = rim_circle(frame.read())
         except TiltvpError as error:
-            complain(named(file, str(error)))
+            complain(named(frame.name, str(error)))
             well = False
             continue
         if found is None:
-            complain(f"{file}: no circle gets darker outwards all round, as a rim does")
+            complain(f"{frame.name}: no circle gets darker outwards all round, as a rim does")
             well = False
             continue
         u, v = found.centre_px
-        table.add_row(file.name, f"{u:.1f}", f"{v:.1f}", f"{found.radius_px:.1f}", f"{100.0 * found.covered:.0f}")
+        numbers = f"{u:.1f}", f"{v:.1f}", f"{found.radius_px:.1f}", f"{100.0 * found.covered:.0f}"
+        table.add_row(Path(frame.name).name, *numbers)
     show(table)
     return 0 if well else 1
 

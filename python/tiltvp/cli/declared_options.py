@@ -35,8 +35,10 @@ _TYPES: dict[str, Any] = {
     "npt.NDArray[np.bool_]": Path,
 }  # fmt: skip
 
-KEYWORDS = set[str]()
+KEYWORDS = {"robot_from_camera"}
 """The keywords of the library that are options here."""
+_OTHER_FLAGS = {"gamma_rad": "--gamma"}
+"""Names of options that are not made of their keywords."""
 
 
 class LibraryOptions:
@@ -132,7 +134,7 @@ def _shown(field: Mapping[str, Any]) -> str:
 
 def flag_of(keyword: str) -> str:
     """The name of an option of the library, or of its field here, on the command line."""
-    return f"--{_name(keyword).replace('_', '-')}"
+    return _OTHER_FLAGS.get(keyword) or f"--{_name(keyword).replace('_', '-')}"
 
 
 def is_angle(keyword: str) -> bool:

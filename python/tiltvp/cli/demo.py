@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
 from tiltvp.cli.tilt_work import words_of
+from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder, write_whole
 
 if TYPE_CHECKING:
@@ -58,10 +59,10 @@ class Trial:
 
 def demo(
     *,
-    out: Path = Path("out/demo"),
+    out: Path | None = None,
     page: Path | None = None,
     seed: Whole = 8,
-    alpha_deg: float = 4.0,
+    alpha_deg: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=180))] = 4.0,
     beta_deg: float = 30.0,
     kind: str = "office",
     width: Annotated[Whole, Parameter(show=False)] = 640,
@@ -72,7 +73,7 @@ def demo(
     Parameters
     ----------
     out
-        Folder for input.png, overlay.png, levelled.png, plot.png and summary.png.
+        Folder for input.png, overlay.png, levelled.png, plot.png and summary.png; by default out/demo.
     page
         Write this page (.html) in place of the pictures: two sliders lean the robot, and show what its camera sees, the
         edges, the estimate and the level view. It needs no network.
@@ -93,8 +94,11 @@ def demo(
     from tiltvp.synth import render_room
 
     if page is not None:
+        if out is not None:
+            raise InvalidInputError(f"--out {out} beside --page {page}, expected one of them")
         _write_page(page, kind, seed)
         return
+    out = Path("out/demo") if out is None else out
     check_output_folder(out)
     camera = _camera(width, height)
     with status(f"rendering a room ({kind}, seed {seed})"):

@@ -44,7 +44,7 @@ def image_size_from(text: str | None, option: str = "--image-size") -> tuple[int
     """(width, height) from `640x480`."""
     if text is None:
         return None
-    found = re.fullmatch(r"\s*(\d+)\s*[xX*,]\s*(\d+)\s*", text)
+    found = re.fullmatch(r"\s*(0*[1-9]\d*)\s*[xX*,]\s*(0*[1-9]\d*)\s*", text)
     if found is None:
         raise InvalidInputError(f"{option} {text!r}, expected WIDTHxHEIGHT in pixels, such as 640x480")
     return int(found[1]), int(found[2])

@@ -176,7 +176,7 @@ def legs_from(words: Sequence[str]) -> NDArray[np.float64]:
     """(L, 2) metres and radians, from pairs or the name of a trajectory."""
     from tiltvp.synth import drive_legs
 
-    if len(words) == 1 and "," not in words[0]:
+    if len(words) == 1 and words[0].isalpha():
         return drive_legs(words[0])
     return np.array([_pair(word.split(","), f"--legs {word!r}", "METRES,DEGREES") for word in words]) * (
         1.0,

@@ -44,11 +44,12 @@ def level(
         raise InvalidInputError(f"--out {out}: is of turned panoramas, expected a folder of panoramas too")
     if directory is None and inertial is None and every > 1:
         raise InvalidInputError(f"--every {every}: expected a folder of panoramas or --inertial too")
+    chosen = [] if directory is None else read_panorama_index(directory)[::every]
+    items = [] if inertial is None else read_inertial_index(inertial)[::every]
     with progress_bar(6, "times") as bar:
         times = remap_times(advance=bar.advance)
     show_frame("A level image by a new tilt beside cv2.remap with ready maps, one thread", times, ["image"])
     if directory is not None:
-        chosen = read_panorama_index(directory)[::every]
         photos = chosen[:: max(1, len(chosen) // _PHOTOS)]
         with progress_bar(len(photos), "photographs") as bar:
             times = photo_times(photos, advance=bar.advance)
@@ -61,7 +62,6 @@ def level(
         title = f"{len(chosen)} panoramas turned by up to 30 degrees: errors in degrees of those that are believed"
         show_frame(title, summarise_turned(table), ["method"])
     if inertial is not None:
-        items = read_inertial_index(inertial)[::every]
         with progress_bar(len(items), "panoramas as taken") as bar:
             table = lean_against_sensor(items, advance=bar.advance)
         title = "Lean minus sensor, degrees, constant offset removed"

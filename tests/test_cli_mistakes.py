@@ -1,0 +1,52 @@
+"""What is said of plausible mistakes, in one line and by the names that are typed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import tiltvp
+from command_inputs import write_drive_log
+from commands import Run
+
+
+@pytest.fixture
+def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """camera.toml, and the log of a drive, in the working folder."""
+    camera.save(tmp_path / "camera.toml")
+    write_drive_log(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("tilt x.png --camera camera.toml --margin-px 500",
+         "--elevation-min-deg, --elevation-max-deg = 0, 45 degrees (0, 0.785 radians), expected a band that some "
+         "pixel of the camera sees: check --robot-from-camera, the mask and the margin"),
+        ("tilt x.png --camera camera.toml --image-size 640x480",
+         "camera.toml: the image is 256x256, expected the 640x480 of --image-size, at camera[0]"),
+        ("corner x.png --calibration camera.toml --gamma 1.57",
+         "--gamma = 1.57 degrees (0.0274017 radians), expected an angle from 0.1 to 3 rad"),
+        ("corner x.png --calibration camera.toml --faces red,green",
+         "--faces red,green, expected one of r, g and b for each face, as rgb"),
+        ("camera scale camera.toml out.toml --to 0x0", "--to '0x0', expected WIDTHxHEIGHT in pixels, such as 640x480"),
+        ("calibrate bearings.csv wheels.csv --wheel-base 0.4",
+         "bearings.csv, line 1: no column 'delta_left_m', expected step, time_s, delta_left_m, delta_right_m"),
+        ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --start 0 0 90",
+         "--start: a yaw of 90 radians, expected at most 2 pi; 90 degrees are 1.571"),
+        ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --start-sigma 0.3 0.3 30",
+         "--start-sigma: a yaw of 30 radians, expected at most 2 pi; 30 degrees are 0.5236"),
+        ("dataset drive --out d --legs 2.3", "--legs '2.3', expected METRES,DEGREES"),
+        ("demo --alpha-deg 400", 'Invalid value "400.0" for --alpha-deg. Must be <= 180. Try `tiltvp demo --help`.'),
+        ("demo --page p.html --out d", "--out d beside --page p.html, expected one of them"),
+    ],
+)  # fmt: skip
+def test_it_is_told(run: Run, folder: Path, words: str, told: str) -> None:
+    before = set(folder.iterdir())
+    said = run(*words.split())
+    assert (said.code, said.out) == (2, "")
+    assert said.complaint == f"tiltvp: {told}\n"
+    assert set(folder.iterdir()) == before
