@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.frame_sizes import check_panoramas
+from tiltvp.cli.frame_checks import check_panoramas
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of

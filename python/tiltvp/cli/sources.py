@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Self, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import WHEEL_BASE_MAX_M
-from tiltvp.cli.frame_sizes import check_sizes
+from tiltvp.cli.frame_checks import check_sizes
 from tiltvp.cli.options import ABOVE_0, ALL_CORES, AtLeast0, given_words
 from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.terminal import complain

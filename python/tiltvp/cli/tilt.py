@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 from tiltvp.cli.answers import check_answers, check_stamps, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
+from tiltvp.cli.frame_checks import tell_setup
 from tiltvp.cli.options import AtLeast1, CameraOptions, FrameRate, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
@@ -199,7 +200,6 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
     """
     import numpy as np
 
-    from tiltvp import check_setup
     from tiltvp.robot_setup import LEAST, joined_mask, rim_and_body, spread
 
     camera = estimator.camera
@@ -219,10 +219,7 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
         mask = joined_mask(rim, body)
         if mask is not None:
             estimator = estimator.with_options(mask=mask)
-    found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
-    if not found:
-        suspect = "--camera" if found.believable else "--robot-from-camera"
-        complain(f"{suspect}: {found.reason}")
+    tell_setup(images, estimator, mask)
     return estimator
 
 

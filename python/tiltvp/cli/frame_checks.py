@@ -1,18 +1,20 @@
-"""Whether frames have the size that they must have, told before any work is done with them."""
+"""Whether frames are those of the camera and its mounting, told before the work."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
-    from tiltvp import _core
+    from numpy.typing import NDArray
+
+    from tiltvp import TiltEstimator, _core
     from tiltvp.streams import Frames
 
-__all__ = ["check_panoramas", "check_sizes"]
+__all__ = ["check_panoramas", "check_sizes", "tell_setup"]
 
 
 def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
@@ -49,6 +51,16 @@ def check_panoramas(frames: Frames) -> None:
         if size is not None and all(each is not None and each[0] != 2 * each[1] for _, each in sizes):
             found = f"{name}: {size[0]} x {size[1]} pixels, and no --camera"
             raise InvalidInputError(f"{found}, expected one, or 360-degree panoramas, twice as wide as high")
+
+
+def tell_setup(images: Sequence[NDArray[Any]], estimator: TiltEstimator, mask: NDArray[Any] | None) -> None:
+    """A line on stderr where images from different places speak against the mounting or the calibration."""
+    from tiltvp import check_setup
+
+    found = check_setup(images, estimator.camera, estimator.robot_from_camera, mask=mask)
+    if not found:
+        suspect = "--camera" if found.believable else "--robot-from-camera"
+        complain(f"{suspect}: {found.reason}")
 
 
 def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:

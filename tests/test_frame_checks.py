@@ -1,4 +1,4 @@
-"""Folders and videos with images of another size than the calibration's: told once, and before any work is done."""
+"""Images of another size than the calibration's, of none, and of another mounting: told once, and before the work."""
 
 from __future__ import annotations
 
@@ -125,3 +125,10 @@ def test_images_that_are_no_panoramas_are_not_levelled_one_by_one(run: Run, fold
     assert (said.code, said.out) == (2, "")
     assert "240 x 180 pixels, and no --camera, expected one, or 360-degree panoramas" in said.complaint
     assert not (folder / "level").exists()
+
+
+def test_mount_says_where_images_speak_against_the_mounting(run: Run, folder: Path) -> None:
+    words = ("mount", "images", "--camera", "camera.toml", "--level-floor")
+    assert "--robot-from-camera" not in run(*words).err
+    told = run(*words, "--robot-from-camera", "forward").complaint
+    assert told.startswith("tiltvp: --robot-from-camera: 5 images: up is the camera's +z (it looks up; ")
