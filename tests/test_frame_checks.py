@@ -127,8 +127,9 @@ def test_images_that_are_no_panoramas_are_not_levelled_one_by_one(run: Run, fold
     assert not (folder / "level").exists()
 
 
-def test_mount_says_where_images_speak_against_the_mounting(run: Run, folder: Path) -> None:
-    words = ("mount", "images", "--camera", "camera.toml", "--level-floor")
+@pytest.mark.parametrize("verb", ["mount --level-floor", f"calibrate {ODOMETRY}"])
+def test_it_is_said_where_images_speak_against_the_mounting(run: Run, folder: Path, verb: str) -> None:
+    words = (*verb.split(), "images", "--camera", "camera.toml")
     assert "--robot-from-camera" not in run(*words).err
-    told = run(*words, "--robot-from-camera", "forward").complaint
+    told = run(*words, "--robot-from-camera", "forward").err
     assert told.startswith("tiltvp: --robot-from-camera: 5 images: up is the camera's +z (it looks up; ")

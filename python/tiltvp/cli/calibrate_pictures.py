@@ -12,6 +12,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
 from tiltvp.cli.declared_options import Whole
+from tiltvp.cli.frame_checks import tell_setup_of
 from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import KeptOptions, MotionOptions, ending_at_interrupt
 from tiltvp.cli.tables import check_ending, write_table
@@ -133,6 +134,7 @@ class PictureLog:
 
         estimator = self.lines.mounted(self.camera, **TILT_OPTIONS)
         rotation = estimator.robot_from_camera
+        tell_setup_of(self.frames, estimator)
         with progress_bar(measured_count(self.frames), f"{self.name}: leans") as bar:
             tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)
         return mounting_tilt(

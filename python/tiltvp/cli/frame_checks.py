@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tiltvp import TiltEstimator, _core
     from tiltvp.streams import Frames
 
-__all__ = ["check_panoramas", "check_sizes", "tell_setup"]
+__all__ = ["check_panoramas", "check_sizes", "tell_setup", "tell_setup_of"]
 
 
 def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
@@ -61,6 +61,15 @@ def tell_setup(images: Sequence[NDArray[Any]], estimator: TiltEstimator, mask: N
     if not found:
         suspect = "--camera" if found.believable else "--robot-from-camera"
         complain(f"{suspect}: {found.reason}")
+
+
+def tell_setup_of(frames: Frames, estimator: TiltEstimator) -> None:
+    """`tell_setup` of a few frames, spread over a source that can be read again."""
+    from tiltvp.robot_setup import LEAST, spread
+
+    images = [image for _, image in spread(frames, estimator.camera, LEAST)]
+    if len(images) == LEAST:
+        tell_setup(images, estimator, estimator.options["mask"])
 
 
 def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tiltvp.cli.frame_checks import tell_setup
+from tiltvp.cli.frame_checks import tell_setup_of
 from tiltvp.cli.options import ABOVE_0, CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import KeptOptions, MotionOptions, check_apart
@@ -54,7 +54,7 @@ def mount(
         File for the result (.json).
     """
     from tiltvp.mounting import mounting_tilt
-    from tiltvp.robot_setup import LEAST, TILT_OPTIONS, drive_tilts, measured_count, spread
+    from tiltvp.robot_setup import TILT_OPTIONS, drive_tilts, measured_count
 
     check_file("--out", out, ".json")
     robot = camera.robot()
@@ -64,9 +64,7 @@ def mount(
     check_apart(frames, out, beside=(motion.odometry, mounted.mask, camera.camera))
     moved = motion.motions_of(robot, frames)
     motions = moved.motions if moved is not None and moved.turns_known else None
-    seen = [image for _, image in spread(frames, estimator.camera, LEAST)]
-    if len(seen) == LEAST:
-        tell_setup(seen, estimator, estimator.options["mask"])
+    tell_setup_of(frames, estimator)
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
     found = mounting_tilt(
