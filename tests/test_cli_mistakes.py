@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -28,6 +31,11 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
          "pixel of the camera sees: check --robot-from-camera, the mask and the margin"),
         ("tilt x.png --camera camera.toml --image-size 640x480",
          "camera.toml: the image is 256x256, expected the 640x480 of --image-size, at camera[0]"),
+        ("tilt x.png --camera camera.toml --robot-from-camera down",
+         "--robot-from-camera 'down' is no file and no word, expected a file with a rotation, or one of up, forward"),
+        ("tilt x.png --camera camera.toml --camera-format kalibr",
+         "camera.toml: no keys to read (a str at the top), expected named values, at the top (read as kalibr, and it "
+         "is of tiltvp)"),
         ("corner x.png --calibration camera.toml --gamma 1.57",
          "--gamma = 1.57 degrees (0.0274017 radians), expected an angle from 0.1 to 3 rad"),
         ("corner x.png --calibration camera.toml --faces red,green",
@@ -50,3 +58,15 @@ def test_it_is_told(run: Run, folder: Path, words: str, told: str) -> None:
     assert (said.code, said.out) == (2, "")
     assert said.complaint == f"tiltvp: {told}\n"
     assert set(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("verb", ["tilt", "tilt --threads 2", "segments", "lines", "track", "level"])
+@pytest.mark.parametrize("words", [(), ("--raw", "256x256")])
+def test_a_stream_without_frames_is_wrong_use(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, verb: str, words: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO()))
+    out = "out.avi" if verb == "level" else "out.csv"
+    said = run(*verb.split(), "-", "--camera", "camera.toml", "--out", out, *words)
+    assert (said.code, said.out, (folder / out).exists()) == (2, "", False)
+    assert said.complaint == "tiltvp: -: no frames came, expected one or more\n"

@@ -43,7 +43,11 @@ class OutputOptions:
     def keywords(self) -> dict[str, object]:
         """Those of `tiltvp.Leveller`."""
         angle = None if self.field_of_view_deg is None else math.radians(self.field_of_view_deg)
-        looks = None if self.robot_from_output is None else rotation_of(self.robot_from_output)
+        looks = (
+            None
+            if self.robot_from_output is None
+            else rotation_of(self.robot_from_output, option="--robot-from-output")
+        )
         size = image_size_from(self.size, "--size")
         return {"to": self.to, "size": size, "field_of_view_rad": angle, "robot_from_output": looks}
 

@@ -173,13 +173,16 @@ class MethodOptions(MountedOptions):
         return self.mounted(camera, **options)
 
 
-def rotation_of(source: str, topic: str | None = None) -> "NDArray[np.float64]":
+def rotation_of(source: str, topic: str | None = None, *, option: str = "--robot-from-camera") -> "NDArray[np.float64]":
     """The (3, 3) rotation of a word, a file or a recording, of that of the frame of `topic` where it has it."""
     from tiltvp.rotations import read_rotation
     from tiltvp.streams import Recording, is_recording, robot_from_camera
 
     if not is_recording(source):
-        return read_rotation(source)
+        try:
+            return read_rotation(source)
+        except InvalidInputError as error:  # Of a word that is not known.
+            raise InvalidInputError(f"{option} {error}") from error
     recording = Recording(source)
     return robot_from_camera(recording, topic=topic if topic in [one.name for one in recording.topics] else None)
 

@@ -37,11 +37,15 @@ class Repeats:
         """How many are the same as the one before."""
         self.images = 0
         """How many have been read."""
+        self.is_empty = False
+        """Whether the frames have come to their end without any."""
         self._told = 0, 0
 
     def __iter__(self) -> Iterator[Frame]:
+        number = -1
         for number, frame in enumerate(self._frames):
             yield replace(frame, read=partial(self._read, number, frame))
+        self.is_empty = number < 0
 
     def tell(self) -> None:
         """A line on stderr, if there are any and it has not been told."""

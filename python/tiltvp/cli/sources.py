@@ -258,8 +258,10 @@ def ending_at_interrupt(frames: Frames, *, ahead: bool = True) -> Iterator[Itera
     """The frames; those of a live camera end at the first Ctrl-C, after which what is begun is finished.
 
     Where all are there already the next ones are decoded while one is worked on, if `ahead`. A line on stderr says how
-    many images are the same as the one before.
+    many images are the same as the one before. Raises `InvalidInputError` where none came, unless of a live camera.
     """
+    from tiltvp.streams import LiveCamera
+
     repeats = Repeats(frames)
     if ahead and frames.count is not None:
         with closing(in_order(_decoded, repeats, _AHEAD)) as coming:
@@ -268,6 +270,8 @@ def ending_at_interrupt(frames: Frames, *, ahead: bool = True) -> Iterator[Itera
         with _interruptible(frames):
             yield iter(repeats)
     repeats.tell()
+    if repeats.is_empty and not isinstance(frames, LiveCamera):
+        raise InvalidInputError(f"{frames.source}: no frames came, expected one or more")
 
 
 @contextmanager

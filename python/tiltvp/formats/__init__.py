@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from tiltvp.arguments import path_from, size_from
-from tiltvp.errors import UnsupportedFormatError
+from tiltvp.errors import CalibrationError, UnsupportedFormatError
 from tiltvp.files import write_whole
 from tiltvp.formats import (
     basalt,
@@ -87,8 +87,15 @@ def read_cameras(
     size = None if image_size is None else size_from(image_size, "image_size")
     chosen = None if format is None else _named(format)
     document = Document.load(path)
-    chosen = chosen or _recognised(document)
-    return [replace(spec, format=chosen.name) for spec in chosen.parse(document, size)]
+    if chosen is None:
+        chosen = _recognised(document)
+    try:
+        return [replace(spec, format=chosen.name) for spec in chosen.parse(document, size)]
+    except CalibrationError as error:
+        fitting = [one.name for one in FORMATS if one.recognise(document)]
+        if chosen.name in fitting or not fitting:
+            raise
+        raise type(error)(f"{error} (read as {chosen.name}, and it is of {' or '.join(fitting)})") from error
 
 
 def write_cameras(
