@@ -168,10 +168,10 @@ def test_the_file_that_is_wrong_is_named(tmp_path: Path, capsys: pytest.CaptureF
     sides = [str(tmp_path / side) for side in ("left", "right")]
     rig = ["--calibration", str(tmp_path / "rig.toml"), "--method", "coloured"]
     assert main(["corner", *sides, *rig]) == 2
-    grey, small, broken, *_ = capsys.readouterr().err.splitlines()
-    a, b = (f"{tmp_path / 'left' / name} and {tmp_path / 'right' / name}" for name in ("a.png", "b.png"))
-    assert grey.startswith(f"tiltvp: {a}: right: shape (360, 480), expected (H, W, 3")
-    assert small.startswith(f"tiltvp: {b}: image: got 360 x 240 pixels")
+    small, grey, broken, *_ = capsys.readouterr().err.splitlines()
+    assert f"first {tmp_path / 'right' / 'b.png'}: got 360 x 240 pixels" in small
+    both = f"{tmp_path / 'left' / 'a.png'} and {tmp_path / 'right' / 'a.png'}"
+    assert grey.startswith(f"tiltvp: {both}: right: shape (360, 480), expected (H, W, 3")
     assert broken.startswith(f"tiltvp: {tmp_path / 'right' / 'c.png'}: not an image")
     assert main(["corner", sides[0], *rig]) == 2
     assert "rig.toml: is a pair of cameras, expected one camera" in capsys.readouterr().err
