@@ -17,7 +17,7 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
 from tiltvp.lab.evaluation.corner_scenes import down_in
 from tiltvp.overlays.corners import draw_names
-from tiltvp.synth import Room, StereoSequence, zed_cameras
+from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
 
@@ -182,3 +182,15 @@ def test_a_drawn_box_has_its_sizes() -> None:
     assert np.isfinite(off).sum() >= 2
     assert np.nanmax(np.abs(off)) < 4.0
     assert corner_rows([(0.0, "a.png", estimate)])[0]["box"] == 1
+
+
+def test_a_box_that_stands_turned_against_the_walls_is_listed_beside_them() -> None:
+    left, right = zed_cameras(1280)
+    sequence = StereoSequence(Laboratory(8401), left=left, right=right, frames=100, seed=8401)
+    estimate = CornerPoseEstimator(left, right, sequence.left_from_right, method="general")(*sequence.render(70))
+    box_m = sequence.left_from_object(70)[:3, 3]
+    away_m = np.array([np.linalg.norm(corner.pose.vertex_m - box_m) for corner in estimate.corners])
+    assert min(away_m) < 0.03, away_m
+    # Its other corners, and those of the walls.
+    assert np.count_nonzero(away_m < 0.5) >= 3, away_m
+    assert np.count_nonzero(away_m > 2.0) >= 2, away_m

@@ -4,11 +4,15 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::askew::askew;
 use super::common_attitude::{CommonAttitude, StraightEdge, common_attitude};
-use super::manhattan::manhattan;
+use super::manhattan::{manhattan, manhattan_about};
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
 /// of one of three axes in a tenth of all cases.
 pub(crate) const MOST: f64 = 0.4;
+
+/// How far the vertical of what stands beside most may be from theirs: the sine of 1 degree. Desks, cupboards and boxes are 0.1 to 0.4 degrees
+/// off, as edges that are nearly level tell it; backs of chairs, whose edges are at no right angles, 2 to 10.
+const UPRIGHT_SINE: f64 = 0.0175;
 
 /// Attitudes about which the common one may be.
 #[derive(Debug, Clone, Default)]
@@ -52,6 +56,16 @@ fn most_common(
     best.filter(better).or(of_first)
 }
 
+/// The attitude of what stands upright beside most, turned about the second axis of their `attitude`: that which most lines have in common
+/// of those along none of its axes. Such lines tell their vertical again.
+pub(crate) fn attitude_beside(lines: &[StraightEdge], attitude: &Matrix3<f64>) -> Option<CommonAttitude> {
+    let others: Vec<StraightEdge> = lines.iter().filter(|line| !line.runs_along(attitude)).copied().collect();
+    let vertical = attitude.column(1).into_owned();
+    let found = common_attitude(&others, &manhattan_about(&others, &vertical)?)?;
+    let leans = found.camera_from_object.column(1).cross(&vertical).norm() > UPRIGHT_SINE;
+    (!leans).then_some(found)
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Rotation3;
@@ -76,5 +90,19 @@ mod tests {
         assert_eq!(found(12, 17, false), [true, false]);
         assert_eq!(found(6, 40, false), [false, true]);
         assert!(attitude_of_most(&lines(&own, 12, &[0.0]), &Starts::default(), None).is_none());
+    }
+
+    #[test]
+    fn what_stands_upright_beside_most_has_an_attitude_of_its_own() {
+        let most = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
+        let beside = |turn: [f64; 3]| {
+            let own = most * Rotation3::from_euler_angles(turn[0], turn[1], turn[2]).matrix();
+            let all = [lines(&most, 20, &[0.001, -0.001]), lines(&own, 8, &[0.001, -0.001])].concat();
+            attitude_beside(&all, &most).map(|found| off_in_any_naming_rad(&found.camera_from_object, &own))
+        };
+        assert!(beside([0.0, 0.3, 0.0]).is_some_and(|off_rad| off_rad < 3e-3));
+        // A chair's back leans.
+        assert_eq!(beside([0.1, 0.3, 0.0]), None);
+        assert_eq!(attitude_beside(&lines(&most, 20, &[0.001, -0.001]), &most), None);
     }
 }

@@ -57,13 +57,17 @@ impl StraightEdge {
             length_px,
         })
     }
+
+    /// Whether it may be the image of an edge along an axis of an attitude.
+    pub(crate) fn runs_along(&self, attitude: &Matrix3<f64>) -> bool {
+        attitude.tr_mul(&self.normal).abs().min() <= REACH_SINE
+    }
 }
 
 /// The share of the lines' length that may be images of edges along the axes of an attitude. Of random ones it is 0.105.
 pub(crate) fn share_along_axes(lines: &[StraightEdge], attitude: &Matrix3<f64>) -> f64 {
     let (along_px, all_px) = lines.iter().fold((0.0, 0.0), |(along_px, all_px), line| {
-        let runs_along = attitude.tr_mul(&line.normal).abs().min() <= REACH_SINE;
-        (along_px + f64::from(u8::from(runs_along)) * line.length_px, all_px + line.length_px)
+        (along_px + f64::from(u8::from(line.runs_along(attitude))) * line.length_px, all_px + line.length_px)
     });
     along_px / all_px
 }
@@ -80,6 +84,15 @@ pub(crate) struct CommonAttitude {
     /// How far the right image's edges are turned against the left one's, as a rotation vector back, left camera's frame;
     /// none where that may be noise, and of one image.
     pub(crate) turned_apart: Option<Vector3<f64>>,
+}
+
+/// The axes along which the edges of corners have to run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SharedAxes<'a> {
+    /// The attitude on which several corners agree, or most edges.
+    pub(crate) attitude: Option<&'a Matrix3<f64>>,
+    /// That which edges have in common.
+    pub(crate) common: Option<&'a CommonAttitude>,
 }
 
 /// The attitude near `start` along whose axes most edges run, by robust least squares; none if there are too few.

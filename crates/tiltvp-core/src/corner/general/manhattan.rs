@@ -19,8 +19,7 @@ const NEAR_RAD: f64 = 0.004_36;
 /// The attitude whose second axis is the direction near `down` along which most lines run, and whose others are those level ones.
 pub(super) fn manhattan(lines: &[StraightEdge], down: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let down = down.normalize();
-    let mut longest: Vec<StraightEdge> = lines.to_vec();
-    longest.sort_by(|a, b| b.length_px.total_cmp(&a.length_px));
+    let longest = longest_first(lines);
     let upright: Vec<StraightEdge> =
         longest.iter().filter(|line| line.normal.dot(&down).abs() <= DOWN_SINE).copied().collect();
     let tried = &upright[..upright.len().min(TRIED)];
@@ -31,14 +30,29 @@ pub(super) fn manhattan(lines: &[StraightEdge], down: &Vector3<f64>) -> Option<M
         .map(|meeting| meeting * meeting.dot(&down).signum())
         .filter(|vertical| vertical.cross(&down).norm() <= DOWN_SINE);
     let vertical = most_voted(verticals, |vertical| upright.iter().map(|line| vote(line, vertical)).sum())?;
+    about(&longest, &vertical)
+}
+
+/// The attitude about a vertical that is known, along whose level axes most straight edges run.
+pub(super) fn manhattan_about(lines: &[StraightEdge], vertical: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    about(&longest_first(lines), vertical)
+}
+
+fn longest_first(lines: &[StraightEdge]) -> Vec<StraightEdge> {
+    let mut longest = lines.to_vec();
+    longest.sort_by(|a, b| b.length_px.total_cmp(&a.length_px));
+    longest
+}
+
+fn about(longest: &[StraightEdge], vertical: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let level: Vec<StraightEdge> =
-        longest.into_iter().filter(|line| line.normal.dot(&vertical).abs() > 2.0 * NEAR_RAD).collect();
+        longest.iter().filter(|line| line.normal.dot(vertical).abs() > 2.0 * NEAR_RAD).copied().collect();
     let axes = level.iter().take(TRIED).filter_map(|line| vertical.cross(&line.normal).try_normalize(NEAR_RAD));
     let axis = most_voted(axes, |axis| {
-        let other = axis.cross(&vertical);
+        let other = axis.cross(vertical);
         level.iter().map(|line| vote(line, axis).max(vote(line, &other))).sum()
     })?;
-    Some(Matrix3::from_columns(&[axis, vertical, axis.cross(&vertical)]))
+    Some(Matrix3::from_columns(&[axis, *vertical, axis.cross(vertical)]))
 }
 
 /// How much a line says for a direction, from 0 to 1.

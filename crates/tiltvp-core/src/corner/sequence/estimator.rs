@@ -14,7 +14,7 @@ use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hyp
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
-use crate::corner::general::common_attitude::CommonAttitude;
+use crate::corner::general::common_attitude::{CommonAttitude, SharedAxes};
 use crate::corner::general::guided::ExpectedCorner;
 use crate::corner::options::CornerMethod;
 use crate::corner::pose::check_baseline;
@@ -195,10 +195,14 @@ impl CornerPoseEstimator {
         let starts = self.attitudes(&estimate.features)?;
         let common = self.common(&starts);
         let attitude = common.map(|common| common.camera_from_object).or(starts.attitudes.first().copied());
+        let mut beside = None;
         // Of one image no corner but those that were found without an attitude says that it is one.
-        if let (Some(attitude), Some(right)) = (&attitude, right) {
-            self.add_completed([left, right], attitude, &mut estimate.features);
-            self.add_transferred([left, right], attitude, &mut estimate.features)?;
+        if let Some(right) = right {
+            beside = common.as_ref().and_then(|common| self.beside(common));
+            for attitude in attitude.into_iter().chain(beside.map(|beside| beside.camera_from_object)) {
+                self.add_completed([left, right], &attitude, &mut estimate.features);
+                self.add_transferred([left, right], &attitude, &mut estimate.features)?;
+            }
         }
         let mut seen = Vec::new();
         if estimate.features[0].is_empty() {
@@ -208,12 +212,16 @@ impl CornerPoseEstimator {
         } else if self.right.is_some() && self.is_as_published() {
             self.by_paper(&mut estimate)?;
         } else if self.right.is_some() {
-            seen = self.by_pair([left, right.unwrap_or(left)], attitude.as_ref(), common.as_ref(), &mut estimate)?;
+            let axes = SharedAxes { attitude: attitude.as_ref(), common: common.as_ref() };
+            seen = self.by_pair([left, right.unwrap_or(left)], axes, beside.as_ref(), &mut estimate)?;
         } else {
             self.by_one(common.as_ref(), &mut estimate)?;
         }
         let corners = estimate.chosen_left.len();
-        if estimate.hypotheses.first().is_some_and(|best| self.stands_alone(best, corners)) {
+        let is_beside = |best: &Hypothesis| {
+            beside.is_some_and(|beside| self.are_parallel(&best.camera_from_object, &beside.camera_from_object))
+        };
+        if estimate.hypotheses.first().is_some_and(|best| !is_beside(best) && self.stands_alone(best, corners)) {
             estimate.hypotheses.clear();
             (estimate.chosen_left, estimate.chosen_right) = (Vec::new(), None);
         }

@@ -1,8 +1,6 @@
 //! Which pair of corners, one of each image, is believed.
 
-use nalgebra::Matrix3;
-
-use super::agreement::{apart, renamed};
+use super::agreement::apart;
 use super::estimator::CornerPoseEstimator;
 use super::seen_pair::SeenPair;
 use super::support::CornerSupport;
@@ -12,7 +10,7 @@ use crate::corner::estimate::CornerEstimate;
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
 use crate::corner::general::beginnings::Beginnings;
-use crate::corner::general::common_attitude::CommonAttitude;
+use crate::corner::general::common_attitude::{CommonAttitude, SharedAxes};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
@@ -42,8 +40,6 @@ pub(super) struct PairSearch<'a> {
     begin: [Vec<Beginnings>; 2],
     support: CornerSupport,
     priors: Vec<AttitudePrior>,
-    attitude: Option<&'a Matrix3<f64>>,
-    common: Option<&'a CommonAttitude>,
 }
 
 /// A pair that is believed.
@@ -56,14 +52,14 @@ struct JudgedPair {
 
 impl CornerPoseEstimator {
     /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
-    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
-    /// out. Where the attitude is `common` to most edges and no pair fits well, one that fits fairly is believed, and then one whose edges
-    /// are not shown to begin at its vertex. Returns all pairs that fit well, chosen or not.
+    /// beside it, where there is one. Where an attitude is known on which several corners agree, pairs that do not are left
+    /// out, but for those of the attitude `beside` it. Where the attitude is common to most edges and no pair fits well, one that fits fairly is
+    /// believed, and then one whose edges are not shown to begin at its vertex. Returns all pairs that fit well, chosen or not.
     pub(crate) fn by_pair(
         &self,
         frames: [&Frame<'_>; 2],
-        attitude: Option<&Matrix3<f64>>,
-        common: Option<&CommonAttitude>,
+        axes: SharedAxes<'_>,
+        beside: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
     ) -> Result<Vec<SeenPair>> {
         let Some((detector, left_from_right)) = &self.right else { return Ok(Vec::new()) };
@@ -73,20 +69,16 @@ impl CornerPoseEstimator {
         });
         let support = CornerSupport::new(features, left_from_right);
         let priors = self.priors(self.is_one_object());
-        let search = PairSearch {
-            estimator: self,
-            detector,
-            left_from_right,
-            features,
-            begin,
-            support,
-            priors,
-            attitude,
-            common,
-        };
-        let judged = search.judged(true)?;
+        let search = PairSearch { estimator: self, detector, left_from_right, features, begin, support, priors };
+        let mut judged = search.judged(axes, true)?;
+        if let Some(beside) = beside {
+            let beside = SharedAxes { attitude: Some(&beside.camera_from_object), common: Some(beside) };
+            judged.extend(search.judged(beside, true)?);
+        }
         let best = match PairSearch::best(&judged) {
-            None if common.is_some() && !self.is_one_object() => PairSearch::best(&search.judged(false)?).cloned(),
+            None if axes.common.is_some() && !self.is_one_object() => {
+                PairSearch::best(&search.judged(axes, false)?).cloned()
+            }
             best => best.cloned(),
         };
         if let Some(SeenPair { left, right, poses }) = best {
@@ -99,11 +91,11 @@ impl CornerPoseEstimator {
 
 impl PairSearch<'_> {
     /// The pairs that are believed, or that would be if they were the corner that is followed, whose score is none.
-    fn judged(&self, is_strict: bool) -> Result<Vec<JudgedPair>> {
+    fn judged(&self, axes: SharedAxes<'_>, is_strict: bool) -> Result<Vec<JudgedPair>> {
         let mut out = Vec::new();
         for left in 0..self.features[0].len() {
             for right in 0..self.features[1].len() {
-                out.extend(self.judge(left, right, is_strict)?);
+                out.extend(self.judge([left, right], axes, is_strict)?);
             }
         }
         Ok(out)
@@ -117,8 +109,8 @@ impl PairSearch<'_> {
     }
 
     /// A pair of features as a corner; none if it is not believed.
-    fn judge(&self, left: usize, right: usize, is_strict: bool) -> Result<Option<JudgedPair>> {
-        let Self { estimator, common, .. } = self;
+    fn judge(&self, [left, right]: [usize; 2], axes: SharedAxes<'_>, is_strict: bool) -> Result<Option<JudgedPair>> {
+        let estimator = self.estimator;
         let one_object = estimator.is_one_object();
         let features = [&self.features[0][left], &self.features[1][right]];
         let begin = [&self.begin[0][left], &self.begin[1][right]];
@@ -128,7 +120,7 @@ impl PairSearch<'_> {
         }
         let of = |corners: &[CornerFeature; 2], most: f64| {
             let camera = (self.detector, self.left_from_right);
-            estimator.pair_poses([&corners[0], &corners[1]], camera, &self.priors, *common, most)
+            estimator.pair_poses([&corners[0], &corners[1]], camera, &self.priors, axes.common, most)
         };
         let share = if is_strict { WELL } else { FAIRLY };
         let misfit_most = share * estimator.options.misfit_max;
@@ -136,11 +128,7 @@ impl PairSearch<'_> {
         let poses = of(&corners, misfit_most)?;
         let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else { return Ok(None) };
         let misfit = pose.misfit;
-        let agrees = |attitude: &Matrix3<f64>| {
-            let own = renamed(&pose.camera_from_object, attitude);
-            apart(&own, attitude) <= estimator.options.agree_max_rad
-        };
-        if self.attitude.is_some_and(|attitude| !agrees(attitude)) {
+        if axes.attitude.is_some_and(|attitude| !estimator.are_parallel(&pose.camera_from_object, attitude)) {
             return Ok(None);
         }
         let is_known = estimator.track.as_ref().is_some_and(|track| track.likelihood(pose, false).is_some());

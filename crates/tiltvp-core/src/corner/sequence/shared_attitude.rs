@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::agreement::{agreement, fits, renamed};
+use super::agreement::{agreement, apart, fits, renamed};
 use super::estimator::CornerPoseEstimator;
 use super::turned_apart::turned_apart;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::attitude_of_most::{MOST, Starts, attitude_of_most};
+use crate::corner::general::attitude_of_most::{MOST, Starts, attitude_beside, attitude_of_most};
 use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, share_along_axes};
 use crate::error::Result;
 
@@ -55,6 +55,19 @@ impl CornerPoseEstimator {
         let each = self.lines_of_each();
         let common = attitude_of_most(&each.concat(), starts, self.vertical_of_room())?;
         Some(CommonAttitude { turned_apart: turned_apart(&each, &common.camera_from_object), ..common })
+    }
+
+    /// The attitude of what stands upright beside most, turned about the vertical, if there is any.
+    pub(super) fn beside(&self, common: &CommonAttitude) -> Option<CommonAttitude> {
+        let lines = self.lines_of_each().concat();
+        let found = attitude_beside(&lines, &self.upright(common.camera_from_object))?;
+        let is_other = !self.are_parallel(&found.camera_from_object, &common.camera_from_object);
+        is_other.then_some(CommonAttitude { turned_apart: common.turned_apart, ..found })
+    }
+
+    /// Whether two attitudes have the same axes, however these are named.
+    pub(super) fn are_parallel(&self, own: &Matrix3<f64>, other: &Matrix3<f64>) -> bool {
+        apart(&renamed(own, other), other) <= self.options.agree_max_rad
     }
 
     /// Whether most straight edges of the images contradict the gravity that is told in this frame.
