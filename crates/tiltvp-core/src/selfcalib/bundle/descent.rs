@@ -163,7 +163,7 @@ impl BundleProblem {
             let last = self.keyframes.len() - 1;
             let system = self.eliminate_poses(last, false, damping);
             let moved = system.and_then(|system| Some(system.predicted_reduction + self.take_step(&system)?));
-            let is_lower = |next: &f64| next.is_finite() && !rises(*next, cost);
+            let is_lower = |next: &f64| next.is_finite() && *next <= cost + ROUNDING * cost;
             let fixed = moved.map(|_| self.cost()).filter(is_lower);
             let carried = carrying && fixed.is_none() && moved.is_some() && self.take_relative_step(&before);
             let lower = fixed.or_else(|| carried.then(|| self.cost()).filter(is_lower));
@@ -246,7 +246,7 @@ impl BundleProblem {
 
 /// Whether a cost is above another one beyond rounding, or NaN.
 fn rises(cost: f64, reached: f64) -> bool {
-    cost.is_nan() || cost > reached + ROUNDING * reached.abs()
+    cost.is_nan() || cost > reached * (1.0 + ROUNDING)
 }
 
 #[cfg(test)]
