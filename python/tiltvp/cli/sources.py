@@ -81,13 +81,20 @@ class KeptOptions:
         """
         from tiltvp.streams import open_frames
 
-        if list(words) == [STDIN]:
-            raise InvalidInputError("-: comes only once, expected images, a video or a recording")
+        once = self._once(words)
+        if once is not None:
+            return once
         frames = open_frames(list(words), topic=self.topic, option=topic_option)
         tell(*frames.problems, *frames.notes)
         if camera is not None:
             check_sizes(frames, camera, names_each=names_each)
         return frames
+
+    def _once(self, words: Sequence[str]) -> Frames | None:
+        """Frames that come only once, where words or options name such."""
+        if list(words) == [STDIN]:
+            raise InvalidInputError("-: comes only once, expected images, a video or a recording")
+        return None
 
 
 @Parameter(name="*", group=_SOURCE)
@@ -100,15 +107,7 @@ class SourceOptions(KeptOptions):
     raw: str | None = None
     """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
 
-    def open(
-        self,
-        words: Sequence[str],
-        camera: _core.Camera | None = None,
-        *,
-        topic_option: str = "--topic",
-        names_each: bool = True,
-    ) -> Frames:
-        """The same, and what comes only once."""
+    def _once(self, words: Sequence[str]) -> Frames | None:
         from tiltvp.streams import LiveCamera, NamedImages, RawImages
         from tiltvp.streams.live import raw_size
 
@@ -122,7 +121,7 @@ class SourceOptions(KeptOptions):
             raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
         if list(words) == [STDIN]:
             return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
-        return super().open(words, camera, topic_option=topic_option, names_each=names_each)
+        return None
 
 
 @Parameter(name="*", group=Group("Odometry"))
