@@ -847,7 +847,7 @@ class CornerFeature:
 
     @property
     def support_px(self) -> list[int]:
-        """How many places of each ray it was fitted to."""
+        """How many places of each ray it was fitted to; 0 of the edge of an L-junction that is not seen."""
 
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name, arrays as nested lists: plain, good for JSON."""

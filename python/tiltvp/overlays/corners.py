@@ -30,8 +30,8 @@ _LENGTH = 0.15
 def draw_corners(
     image: ArrayLike, camera: Camera, features: Sequence[CornerFeature], chosen: Iterable[int] = ()
 ) -> NDArray[np.uint8]:
-    """The image in dimmed grey, (H, W, 3) BGR uint8, with the rays x red, y green, z blue; those not `chosen` are
-    thin.
+    """The image in dimmed grey, (H, W, 3) BGR uint8, with the rays x red, y green, z blue, without edges that
+    are not seen; those not `chosen` are thin.
     """
     import cv2
 
@@ -41,7 +41,9 @@ def draw_corners(
     order = sorted(range(len(features)), key=lambda place: place in wanted)
     for place in order:
         feature, width = features[place], 2 if place in wanted else 1
-        for toward, colour in zip(feature.toward, _EDGE_COLOURS, strict=True):
+        for toward, colour, support in zip(feature.toward, _EDGE_COLOURS, feature.support_px, strict=True):
+            if support == 0:
+                continue
             share = np.linspace(0.0, 1.0, _POINTS)[:, None]
             _curve(canvas, camera, feature.vertex * (1.0 - share) + toward * share, colour, width)
         at = _whole(camera.project(feature.vertex))

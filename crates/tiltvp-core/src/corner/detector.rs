@@ -202,11 +202,36 @@ impl CornerDetector {
         scratch: &mut CornerScratch,
         out: &mut Vec<CornerFeature>,
     ) {
-        if let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general)
-            && options.gamma_rad == std::f64::consts::FRAC_PI_2
-        {
-            let Self { camera, light, .. } = self;
-            CornerCompletion { camera, image, options, light, camera_from_object }.run(memory, out);
+        if let Some((completion, memory)) = self.completion(image, camera_from_object, scratch) {
+            completion.run(memory, out);
+        }
+    }
+
+    /// The same of which no third edge is looked for.
+    pub(super) fn l_junctions(
+        &self,
+        image: &ImageView<'_>,
+        camera_from_object: &Matrix3<f64>,
+        scratch: &mut CornerScratch,
+        out: &mut Vec<CornerFeature>,
+    ) {
+        if let Some((completion, memory)) = self.completion(image, camera_from_object, scratch) {
+            completion.l_junctions(memory, out);
+        }
+    }
+
+    fn completion<'a>(
+        &'a self,
+        image: &'a ImageView<'a>,
+        camera_from_object: &'a Matrix3<f64>,
+        scratch: &'a mut CornerScratch,
+    ) -> Option<(CornerCompletion<'a>, &'a mut GeneralScratch)> {
+        let Self { camera, light, .. } = self;
+        match (&self.options.method, &mut scratch.general) {
+            (CornerMethod::General(options), Some(memory)) if options.gamma_rad == std::f64::consts::FRAC_PI_2 => {
+                Some((CornerCompletion { camera, image, options, light, camera_from_object }, memory))
+            }
+            _ => None,
         }
     }
 

@@ -186,6 +186,11 @@ impl CornerFeature {
         along[0].dot(&along[1]) <= most && along[1].dot(&along[2]) <= most && along[2].dot(&along[0]) <= most
     }
 
+    /// How many of its edges are seen: three, or the two of an L-junction, whose third ray has no support.
+    pub(super) fn seen_edges(&self) -> usize {
+        self.rays.iter().filter(|ray| ray.support > 0).count()
+    }
+
     /// How well the rays support the corner, pixels: see [`length_score`].
     pub(super) fn support_score(&self) -> f64 {
         length_score(&self.rays.map(|ray| ray.support as f64))

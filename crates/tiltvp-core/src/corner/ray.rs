@@ -16,7 +16,7 @@ pub struct FittedRay {
     pub covariance: Matrix2<f64>,
     /// Unit bearing of a further point on the ray, away from the vertex.
     pub toward: Vector3<f64>,
-    /// How many pixels along the ray agree with it.
+    /// How many pixels along the ray agree with it; 0 of an edge that is not seen.
     pub support: usize,
     /// Root mean square of the pixels' distances from the great circle, radians.
     pub residual_rms_rad: f64,

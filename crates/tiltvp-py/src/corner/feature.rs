@@ -20,7 +20,7 @@ value! {
         ray_covariances_rad2: [Matrix2<f64>; 3] = own.rays().map(|ray| ray.covariance),
         /// Fresh (3, 3) float64, rows x, y, z: a unit bearing near the far end of each ray.
         toward: [Vector3<f64>; 3] = own.rays().map(|ray| ray.toward),
-        /// How many places of each ray it was fitted to.
+        /// How many places of each ray it was fitted to; 0 of the edge of an L-junction that is not seen.
         support_px: [usize; 3] = own.rays().map(|ray| ray.support),
         /// Root mean square distance of these from each ray, radians.
         ray_rms_rad: [f64; 3] = own.rays().map(|ray| ray.residual_rms_rad),

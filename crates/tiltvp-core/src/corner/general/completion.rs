@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_END_PX, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
+use crate::corner::ray::FittedRay;
 use crate::corner::trace::{RaySearch, TraceScratch, TracedRay, trace_every};
 use crate::image::{ImageView, LightTable};
 use crate::segments::Segment;
@@ -38,11 +39,18 @@ const GLIMPSE_PX: f64 = 3.0;
 const GLIMPSE_SHARE: f64 = 0.8;
 
 /// A crossing of two segments along two of the axes.
-struct AxisCrossing {
+pub(super) struct AxisCrossing {
     ends: [RayEnd; 2],
     axes: [usize; 2],
-    place: Vector3<f64>,
+    pub(super) place: Vector3<f64>,
     shorter_px: f64,
+}
+
+impl AxisCrossing {
+    /// The axis along which neither of the two runs.
+    pub(super) fn third(&self) -> usize {
+        3 - self.axes[0] - self.axes[1]
+    }
 }
 
 /// What a third edge is looked for with.
@@ -67,7 +75,7 @@ impl CornerCompletion<'_> {
     }
 
     /// Where two segments along different axes cross, those of the longest segments first.
-    fn crossings(&self, segments: &[Segment]) -> Vec<AxisCrossing> {
+    pub(super) fn crossings(&self, segments: &[Segment]) -> Vec<AxisCrossing> {
         let axis_of = |normal: &Vector3<f64>| {
             let sines = self.camera_from_object.tr_mul(normal).abs();
             Some(sines.imin()).filter(|axis| sines[*axis] < AXIS_SINE)
@@ -97,6 +105,47 @@ impl CornerCompletion<'_> {
         crossings
     }
 
+    /// The two edges of a crossing, each at the place of its axis.
+    pub(super) fn own_edges(
+        &self,
+        crossing: &AxisCrossing,
+        px_per_rad: f64,
+        segments: &[Segment],
+        memory: &mut TraceScratch,
+    ) -> Option<[Option<TracedRay>; 3]> {
+        let mut rays: [Option<TracedRay>; 3] = [None; 3];
+        for (ray, axis) in crossing.ends.iter().zip(crossing.axes) {
+            let segment = &segments[ray.segment];
+            let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
+            let to_rad = crossing.place.angle(ray.far(segments)) - CLEAR_OF_END_PX / px_per_rad;
+            let search = self.search(crossing, px_per_rad, normal, to_rad);
+            rays[axis] = Some(self.follow(&search, px_per_rad, 1.0, self.options.support_min_share, memory)?);
+        }
+        Some(rays)
+    }
+
+    /// The search for an edge of a crossing.
+    fn search(&self, crossing: &AxisCrossing, px_per_rad: f64, normal: Vector3<f64>, to_rad: f64) -> RaySearch {
+        let vertex = (crossing.place - normal * normal.dot(&crossing.place)).normalize();
+        gray_search(self.options, normal, vertex, [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad])
+    }
+
+    fn follow(
+        &self,
+        search: &RaySearch,
+        px_per_rad: f64,
+        stride_px: f64,
+        share_min: f64,
+        memory: &mut TraceScratch,
+    ) -> Option<TracedRay> {
+        let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
+        let length_px = (search.to_rad - search.from_rad) * px_per_rad;
+        let support_min_px = f64::from(self.options.support_min_px).min(SHORT_SHARE * length_px);
+        let search = RaySearch { share_min, ..*search };
+        trace_every(stride_px, self.camera, &search, support_min_px, signal, memory)
+            .filter(|found| stride_px > 1.0 || found.begins_at_vertex())
+    }
+
     /// Adds the corners at a crossing.
     fn complete(
         &self,
@@ -107,50 +156,31 @@ impl CornerCompletion<'_> {
         out: &mut Vec<CornerFeature>,
     ) {
         let options = self.options;
-        let search = |normal: Vector3<f64>, to_rad: f64| {
-            let vertex = (crossing.place - normal * normal.dot(&crossing.place)).normalize();
-            gray_search(options, normal, vertex, [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad])
-        };
-        let mut follow = |search: &RaySearch, stride_px: f64, share_min: f64| -> Option<TracedRay> {
-            let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
-            let length_px = (search.to_rad - search.from_rad) * px_per_rad;
-            let support_min_px = f64::from(options.support_min_px).min(SHORT_SHARE * length_px);
-            let search = RaySearch { share_min, ..*search };
-            trace_every(stride_px, self.camera, &search, support_min_px, signal, memory)
-                .filter(|found| stride_px > 1.0 || found.begins_at_vertex())
-        };
         let share_min = options.support_min_share;
-        let third = 3 - crossing.axes[0] - crossing.axes[1];
+        let third = crossing.third();
         let to_rad = THIRD_MIN_PX.max(THIRD_SHARE * crossing.shorter_px) / px_per_rad;
         let direction = self.camera_from_object.column(third).into_owned();
         // Most crossings have no third edge. A look at every third pixel shows that.
         let thirds = [direction, -direction].map(|direction| {
-            let long = search(crossing.place.cross(&direction).try_normalize(0.05)?, to_rad);
-            let is_long = follow(&long, GLIMPSE_PX, GLIMPSE_SHARE * share_min).is_some();
+            let normal = crossing.place.cross(&direction).try_normalize(0.05)?;
+            let long = self.search(crossing, px_per_rad, normal, to_rad);
+            let is_long = self.follow(&long, px_per_rad, GLIMPSE_PX, GLIMPSE_SHARE * share_min, memory).is_some();
             Some(if is_long {
                 (long, share_min)
             } else {
                 (RaySearch { to_rad: SHORT_PX / px_per_rad, ..long }, SHORT_SHARE)
             })
         });
-        let thirds = thirds.map(|look| look.and_then(|(search, least_share)| follow(&search, 1.0, least_share)));
+        let thirds =
+            thirds.map(|look| look.and_then(|(search, least)| self.follow(&search, px_per_rad, 1.0, least, memory)));
         if thirds.iter().all(Option::is_none) {
             return;
         }
-        let mut rays: [Option<TracedRay>; 3] = [None; 3];
-        for (ray, axis) in crossing.ends.iter().zip(crossing.axes) {
-            let segment = &segments[ray.segment];
-            let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
-            let to_rad = crossing.place.angle(ray.far(segments)) - CLEAR_OF_END_PX / px_per_rad;
-            rays[axis] = follow(&search(normal, to_rad), 1.0, share_min);
-            if rays[axis].is_none() {
-                return;
-            }
-        }
+        let Some(mut rays) = self.own_edges(crossing, px_per_rad, segments, memory) else { return };
         for found in thirds.into_iter().flatten() {
             rays[third] = Some(found);
             let [Some(x), Some(y), Some(z)] = rays else { continue };
-            let Some(corner) = clockwise(&[x, y, z]) else { continue };
+            let Some(corner) = clockwise(&[x.ray, y.ray, z.ray]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;
             if good && corner.rays_apart(options.ray_angle_min_rad) {
                 out.push(corner);
@@ -160,8 +190,7 @@ impl CornerCompletion<'_> {
 }
 
 /// The feature of three rays with x and z named so that x, y, z are clockwise in the image.
-fn clockwise(traced: &[TracedRay; 3]) -> Option<CornerFeature> {
-    let [x, y, z] = [traced[0].ray, traced[1].ray, traced[2].ray];
+pub(super) fn clockwise(&[x, y, z]: &[FittedRay; 3]) -> Option<CornerFeature> {
     let corner = CornerFeature::from_rays([x, y, z])?;
     let vertex = corner.vertex();
     let along = corner.rays().map(|ray| ray.normal.cross(&vertex));

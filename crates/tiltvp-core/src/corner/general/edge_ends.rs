@@ -6,6 +6,7 @@ use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
+use crate::corner::ray::FittedRay;
 use crate::corner::trace::{RaySearch, trace};
 use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::geometry::{RigidMotion, meeting};
@@ -129,7 +130,10 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
     let GeneralScratch { segments, trace: memory, .. } = scratch;
     for (axis, out) in out.iter_mut().enumerate() {
         let found = meetings(seen, &segments.list, axis, px_per_rad);
-        let normal = seen.corner.rays()[axis].normal;
+        let FittedRay { normal, support, .. } = seen.corner.rays()[axis];
+        if support == 0 {
+            continue;
+        }
         let mut follow = |from_rad: f64, to_rad: f64, share_min: f64| {
             let along = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
             let search = RaySearch { share_min, ..along };

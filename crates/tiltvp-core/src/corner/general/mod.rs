@@ -9,6 +9,7 @@ pub(super) mod double_edges;
 pub(super) mod edge_ends;
 pub(super) mod guided;
 mod junctions;
+mod l_junctions;
 mod manhattan;
 mod sized_ends;
 

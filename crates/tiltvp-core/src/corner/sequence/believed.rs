@@ -53,7 +53,16 @@ impl CornerPoseEstimator {
             let (hypotheses, right) = (estimate.hypotheses.clone(), estimate.chosen_right);
             out.push(BelievedCorner { id: None, hypotheses, left: *left, right, ends: estimate.ends, angles });
         }
-        for pair in self.one_to_one(estimate, seen) {
+        let vertex = |side: usize, which: usize| estimate.features[side][which].vertex();
+        let is_of_pose = |pair: &SeenPair| {
+            let same = |side: usize, own: usize, other: usize| {
+                own == other || vertex(side, own).angle(&vertex(side, other)) < SAME_VERTEX_RAD
+            };
+            estimate.chosen_right.is_some_and(|right| same(1, right, pair.right))
+                || estimate.chosen_left.first().is_some_and(|left| same(0, *left, pair.left))
+        };
+        let beside = seen.into_iter().filter(|pair| !is_of_pose(pair)).collect();
+        for pair in self.one_to_one(&estimate.features, beside) {
             let angles = self.angles_of(estimate, pair.left, Some(pair.right), &pair.poses[0]);
             if !are_of(&angles, &pair.poses[0].edges) {
                 continue;
@@ -65,21 +74,15 @@ impl CornerPoseEstimator {
         out
     }
 
-    /// The pairs beside the pose's whose features are of no other pair that fits about as well and is elsewhere, the best first.
-    fn one_to_one(&self, estimate: &CornerEstimate, seen: Vec<SeenPair>) -> Vec<SeenPair> {
-        let vertex = |side: usize, which: usize| estimate.features[side][which].vertex();
-        let same =
-            |side: usize, a: usize, b: usize| a == b || vertex(side, a).angle(&vertex(side, b)) < SAME_VERTEX_RAD;
-        let of_pose = |pair: &SeenPair| {
-            let right = estimate.chosen_right.is_some_and(|right| same(1, right, pair.right));
-            right || estimate.chosen_left.first().is_some_and(|left| same(0, *left, pair.left))
+    /// The pairs whose features are of no other pair that fits about as well and is elsewhere, the best first.
+    pub(super) fn one_to_one(&self, features: &[Vec<CornerFeature>; 2], seen: Vec<SeenPair>) -> Vec<SeenPair> {
+        let same = |side: usize, a: usize, b: usize| {
+            a == b || features[side][a].vertex().angle(&features[side][b].vertex()) < SAME_VERTEX_RAD
         };
         let misfit = |pair: &SeenPair| pair.poses[0].misfit.max(MISFIT_MIN);
-        let support = |pair: &SeenPair| {
-            let features = [&estimate.features[0][pair.left], &estimate.features[1][pair.right]];
-            features[0].support_score().min(features[1].support_score())
-        };
-        let mut order: Vec<SeenPair> = seen.into_iter().filter(|pair| !of_pose(pair)).collect();
+        let support =
+            |pair: &SeenPair| features[0][pair.left].support_score().min(features[1][pair.right].support_score());
+        let mut order = seen;
         // The best of each corner comes before what is left of its features.
         order.sort_by(|a, b| misfit(a).total_cmp(&misfit(b)).then(support(b).total_cmp(&support(a))));
         let mut taken: Vec<(SeenPair, bool)> = Vec::new();

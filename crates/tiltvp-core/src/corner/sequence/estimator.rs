@@ -142,14 +142,17 @@ impl CornerPoseEstimator {
         if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
             self.track = None;
         }
-        let (mut estimate, mut seen) = self.look(left, right, 1.0)?;
+        let frames = [left, right.unwrap_or(left)];
+        let (mut estimate, mut seen, _) = self.look(left, right, 1.0)?;
         if estimate.hypotheses.is_empty() && matches!(self.left.options().method, CornerMethod::General(_)) {
-            let fainter = self.look(left, right, FAINT)?;
-            if !fainter.0.hypotheses.is_empty() {
-                (estimate, seen) = fainter;
+            let (mut fainter, of_fainter, common) = self.look(left, right, FAINT)?;
+            if let Some(common) = common.filter(|_| fainter.hypotheses.is_empty()) {
+                self.by_l_junctions(frames, &common, &mut fainter)?;
+            }
+            if !fainter.hypotheses.is_empty() {
+                (estimate, seen) = (fainter, of_fainter);
             }
         }
-        let frames = [left, right.unwrap_or(left)];
         if let (Some(_), Some(left), Some(right)) =
             (estimate.pose(), estimate.chosen_left.first(), estimate.chosen_right)
         {
@@ -170,7 +173,7 @@ impl CornerPoseEstimator {
         left: &Frame<'_>,
         right: Option<&Frame<'_>>,
         share: f64,
-    ) -> Result<(CornerEstimate, Vec<SeenPair>)> {
+    ) -> Result<(CornerEstimate, Vec<SeenPair>, Option<CommonAttitude>)> {
         let vertical = self.vertical();
         let mut features = [Vec::new(), Vec::new()];
         let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
@@ -233,7 +236,7 @@ impl CornerPoseEstimator {
         } else if common.is_some_and(|common| self.is_against_gravity(&common)) {
             estimate.verdict = CornerVerdict::AgainstGravity;
         }
-        Ok((estimate, seen))
+        Ok((estimate, seen, common))
     }
 
     /// Goes on to the pose of a frame, and to the corners beside it.
@@ -245,7 +248,9 @@ impl CornerPoseEstimator {
         }
         let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
         let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
-            let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
+            let fits = |corner: &&CornerFeature| {
+                corner.seen_edges() == 3 && fits(corner, &attitude, self.options.agree_max_rad)
+            };
             let mut out: Vec<CornerFeature> = Vec::new();
             for corner in estimate.features[side].iter().filter(fits) {
                 // The longest rays of each vertex.

@@ -4,9 +4,10 @@ use super::agreement::apart;
 use super::estimator::CornerPoseEstimator;
 use super::seen_pair::SeenPair;
 use super::support::CornerSupport;
+use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::detector::CornerDetector;
-use crate::corner::estimate::CornerEstimate;
+use crate::corner::estimate::{CornerEstimate, CornerVerdict};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
 use crate::corner::general::beginnings::Beginnings;
@@ -62,14 +63,7 @@ impl CornerPoseEstimator {
         beside: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
     ) -> Result<Vec<SeenPair>> {
-        let Some((detector, left_from_right)) = &self.right else { return Ok(Vec::new()) };
-        let features = &estimate.features;
-        let begin = [(&self.left, 0), (detector, 1)].map(|(detector, side)| -> Vec<Beginnings> {
-            features[side].iter().map(|corner| detector.beginnings(frames[side], corner)).collect()
-        });
-        let support = CornerSupport::new(features, left_from_right);
-        let priors = self.priors(self.is_one_object());
-        let search = PairSearch { estimator: self, detector, left_from_right, features, begin, support, priors };
+        let Some(search) = self.pair_search(frames, &estimate.features) else { return Ok(Vec::new()) };
         let mut judged = search.judged(axes, true)?;
         if let Some(beside) = beside {
             let beside = SharedAxes { attitude: Some(&beside.camera_from_object), common: Some(beside) };
@@ -86,6 +80,52 @@ impl CornerPoseEstimator {
             estimate.hypotheses = poses;
         }
         Ok(judged.into_iter().filter(|judged| judged.fits_well).map(|judged| judged.pair).collect())
+    }
+
+    /// The pose of the L-junction of both images that fits best, of the common attitude of most edges, where no corner of three edges has
+    /// one. Two edges say less than three: what could as well be another one's is left out.
+    pub(super) fn by_l_junctions(
+        &mut self,
+        frames: [&Frame<'_>; 2],
+        common: &CommonAttitude,
+        estimate: &mut CornerEstimate,
+    ) -> Result<()> {
+        let is_told = self.options.angle == IncludedAngle::RIGHT && self.is_of_most(common);
+        if !is_told || common.turned_apart.is_some() || self.is_against_gravity(common) {
+            return Ok(());
+        }
+        let features = self.l_junctions(frames, &common.camera_from_object);
+        let Some(search) = self.pair_search(frames, &features) else { return Ok(()) };
+        let axes = SharedAxes { attitude: Some(&common.camera_from_object), common: Some(common) };
+        let mut judged = search.judged(axes, true)?;
+        let pairs = judged.iter().filter(|judged| judged.fits_well).map(|judged| judged.pair.clone()).collect();
+        let sure = self.one_to_one(&features, pairs);
+        judged
+            .retain(|judged| sure.iter().any(|pair| [pair.left, pair.right] == [judged.pair.left, judged.pair.right]));
+        let Some(SeenPair { left, right, poses }) = PairSearch::best(&judged) else { return Ok(()) };
+        for (all, chosen) in estimate.features.iter_mut().zip([features[0][*left], features[1][*right]]) {
+            all.push(chosen);
+        }
+        estimate.chosen_left = vec![estimate.features[0].len() - 1];
+        estimate.chosen_right = Some(estimate.features[1].len() - 1);
+        estimate.hypotheses.clone_from(poses);
+        estimate.verdict = CornerVerdict::Found;
+        Ok(())
+    }
+
+    /// With a right camera.
+    fn pair_search<'a>(
+        &'a self,
+        frames: [&Frame<'_>; 2],
+        features: &'a [Vec<CornerFeature>; 2],
+    ) -> Option<PairSearch<'a>> {
+        let (detector, left_from_right) = self.right.as_ref()?;
+        let begin = [(&self.left, 0), (detector, 1)].map(|(detector, side)| -> Vec<Beginnings> {
+            features[side].iter().map(|corner| detector.beginnings(frames[side], corner)).collect()
+        });
+        let support = CornerSupport::new(features, left_from_right);
+        let priors = self.priors(self.is_one_object());
+        Some(PairSearch { estimator: self, detector, left_from_right, features, begin, support, priors })
     }
 }
 
@@ -183,6 +223,7 @@ impl ShownEdges {
             return Some(Self { is_enough: true, corners: [left?, right?] });
         }
         let begin = ends[0].count() + ends[1].count();
-        (begin >= BEGIN_MIN).then_some(Self { is_enough: false, corners: corners.map(|corner| *corner) })
+        (begin >= BEGIN_MIN && corners.iter().all(|corner| corner.seen_edges() == 3))
+            .then_some(Self { is_enough: false, corners: corners.map(|corner| *corner) })
     }
 }

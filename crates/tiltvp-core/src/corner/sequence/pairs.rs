@@ -65,8 +65,9 @@ impl CornerPoseEstimator {
         let seen = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
         let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
         // All rays together miss by no less than the vertices alone. Most pairs are of different corners, and end here.
-        let freedom = common.map_or(FREEDOM_ALONE, |common| FREEDOM * common.scatter.powi(2));
-        if vertex.chi_square > VERTEX_SLACK * freedom * misfit_most.powi(2) {
+        let freedom = Freedom::of([left, right]);
+        let most = common.map_or(freedom.alone, |common| freedom.with_attitude * common.scatter.powi(2));
+        if vertex.chi_square > VERTEX_SLACK * most * misfit_most.powi(2) {
             return Ok(Vec::new());
         }
         let turn = common.and_then(|common| common.turned_apart);
@@ -83,19 +84,15 @@ impl CornerPoseEstimator {
                     continue;
                 }
                 let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
-                let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
                     continue;
                 };
                 if self.is_of_another_angle(&cameras, side, &fused) {
                     continue;
                 }
-                let mut misfit = (fused.chi_square / FREEDOM_ALONE).sqrt();
-                // Covariances do not include edges that do not quite meet, or belong to more than one object.
-                let mut inflation = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
-                if let Some(common) = common.and_then(|common| self.parallel(common, &fused)) {
-                    let Some(with) = fuse_with(&cameras, &self.options.angle, side, &fused, &common) else { continue };
-                    (fused, misfit, inflation) = with;
-                }
+                let Some((fused, misfit, inflation)) = self.with_common(&cameras, side, &fused, common, freedom) else {
+                    continue;
+                };
                 let as_seen = fused.rig_from_object;
                 let fused = FusedPose { rig_from_object: self.upright(fused.rig_from_object), ..fused };
                 let known = |(_, other): &(f64, Hypothesis)| {
@@ -141,6 +138,25 @@ impl CornerPoseEstimator {
         Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
     }
 
+    /// The pose with the common attitude, if it is near to that; its misfit in standard deviations of the rays; and the factor by which its
+    /// covariance is larger than it seems.
+    fn with_common(
+        &self,
+        cameras: &[(&CornerFeature, RigidMotion)],
+        side: f64,
+        own: &FusedPose,
+        common: Option<&CommonAttitude>,
+        freedom: Freedom,
+    ) -> Option<(FusedPose, f64, f64)> {
+        if let Some(common) = common.and_then(|common| self.parallel(common, own)) {
+            return fuse_with(cameras, &self.options.angle, side, own, &common, freedom.with_attitude);
+        }
+        let misfit = (own.chi_square / freedom.alone).sqrt();
+        // Covariances do not include edges that do not quite meet, or belong to more than one object.
+        let inflation = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
+        Some((*own, misfit, inflation))
+    }
+
     /// Whether the rays of both images contradict the included angle: they fit any other far better, or better a right one, which
     /// corners of rooms have.
     fn is_of_another_angle(&self, cameras: &[(&CornerFeature, RigidMotion)], side: f64, pose: &FusedPose) -> bool {
@@ -150,7 +166,7 @@ impl CornerPoseEstimator {
             fused.map_or(f64::INFINITY, |fused| fused.chi_square)
         };
         let far_better = |any: f64| {
-            let scatter = (any / (FREEDOM_ALONE - 1.0)).max(1.0);
+            let scatter = (any / (Freedom::ALONE - 1.0)).max(1.0);
             pose.chi_square - any > ANGLE_OFF_SIGMAS.powi(2) * scatter
         };
         let may_be_right = (FRAC_PI_2 - told.gamma_rad).abs() <= ANGLE_OFF_SIGMAS * told.sigma_rad;
@@ -203,6 +219,7 @@ fn fuse_with(
     side: f64,
     own: &FusedPose,
     common: &CommonAttitude,
+    freedom: f64,
 ) -> Option<(FusedPose, f64, f64)> {
     let start = &common.camera_from_object;
     let variance = common.scatter * common.scatter;
@@ -211,17 +228,31 @@ fn fuse_with(
         fuse_rays_with(cameras, angle, side, start, &own.vertex_m, Some(&known))
     };
     // Rays that miss by more than their covariances count less.
-    let inflation = |fused: &FusedPose| (fused.chi_square / FREEDOM).max(variance);
+    let inflation = |fused: &FusedPose| (fused.chi_square / freedom).max(variance);
     let first = inflation(&fuse(variance)?);
     let fused = fuse(first)?;
-    Some((fused, (fused.chi_square / FREEDOM / variance).sqrt(), inflation(&fused)))
+    Some((fused, (fused.chi_square / freedom / variance).sqrt(), inflation(&fused)))
 }
 
-/// Degrees of freedom of twelve numbers of the rays less six of the pose.
-const FREEDOM_ALONE: f64 = 6.0;
+/// Degrees of freedom of a pair of corners.
+#[derive(Debug, Clone, Copy)]
+struct Freedom {
+    /// Two of each ray that is seen, less six of the pose.
+    alone: f64,
+    /// The same with three of a known attitude.
+    with_attitude: f64,
+}
 
-/// The same with three numbers of a known attitude.
-const FREEDOM: f64 = 9.0;
+impl Freedom {
+    /// Of three edges in two images.
+    const ALONE: f64 = 6.0;
+
+    fn of(corners: [&CornerFeature; 2]) -> Self {
+        let rays: usize = corners.map(CornerFeature::seen_edges).iter().sum();
+        let alone = 2.0 * rays as f64 - 6.0;
+        Self { alone, with_attitude: alone + 3.0 }
+    }
+}
 
 #[cfg(test)]
 mod tests {

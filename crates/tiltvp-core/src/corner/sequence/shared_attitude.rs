@@ -73,9 +73,13 @@ impl CornerPoseEstimator {
     /// Whether most straight edges of the images contradict the gravity that is told in this frame.
     pub(super) fn is_against_gravity(&self, common: &CommonAttitude) -> bool {
         let attitude = self.upright(common.camera_from_object);
-        let most = MOST * self.lines_of_each().iter().map(Vec::len).sum::<usize>() as f64;
-        let told = self.known.gravity.filter(|_| common.support >= most);
+        let told = self.known.gravity.filter(|_| self.is_of_most(common));
         told.is_some_and(|gravity| !gravity.is_along(&attitude, &common.covariance))
+    }
+
+    /// Whether most straight edges of the images have an attitude.
+    pub(super) fn is_of_most(&self, common: &CommonAttitude) -> bool {
+        common.support >= MOST * self.lines_of_each().iter().map(Vec::len).sum::<usize>() as f64
     }
 
     /// The vertical, where it is known, all angles are right and there may be several corners.

@@ -5,12 +5,13 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use super::agreement::{apart, fits, renamed};
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::corner_attitudes;
-use crate::corner::detector::CornerDetector;
+use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
 use crate::corner::general::guided::{EdgeSegments, ExpectedCorner};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
+use crate::image::ImageView;
 
 /// Most corners of one image that are looked for in the other, those with the longest rays, which bounds the time.
 const TRANSFERRED_MAX: usize = 8;
@@ -38,25 +39,42 @@ impl CornerPoseEstimator {
     /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
     pub(crate) fn add_completed(
         &mut self,
-        [left, right]: [&Frame<'_>; 2],
+        frames: [&Frame<'_>; 2],
         attitude: &Matrix3<f64>,
         features: &mut [Vec<CornerFeature>; 2],
+    ) {
+        self.in_each(frames, attitude, features, CornerDetector::complete);
+    }
+
+    /// The L-junctions of each image along the axes of an attitude in the left camera's frame.
+    pub(super) fn l_junctions(&mut self, frames: [&Frame<'_>; 2], attitude: &Matrix3<f64>) -> [Vec<CornerFeature>; 2] {
+        let mut features = [Vec::new(), Vec::new()];
+        self.in_each(frames, attitude, &mut features, CornerDetector::l_junctions);
+        features
+    }
+
+    /// Looks for corners in each grey image, with the attitude in the frame of its own camera.
+    fn in_each(
+        &mut self,
+        frames: [&Frame<'_>; 2],
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+        find: impl Fn(&CornerDetector, &ImageView<'_>, &Matrix3<f64>, &mut CornerScratch, &mut Vec<CornerFeature>),
     ) {
         // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
         let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
         let most_rad = self.options.agree_max_rad;
         let mut found = Vec::new();
-        let mut add =
-            |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
-                if let Frame::Gray(image) = frame {
-                    found.clear();
-                    detector.complete(image, &own, scratch, &mut found);
-                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
-                }
-            };
-        add(&self.left, left, attitude, &mut self.scratch[0], 0);
+        let mut look = |detector: &CornerDetector, side: usize, own: Matrix3<f64>, scratch: &mut CornerScratch| {
+            if let Frame::Gray(image) = frames[side] {
+                found.clear();
+                find(detector, image, &own, scratch, &mut found);
+                features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
+            }
+        };
+        look(&self.left, 0, attitude, &mut self.scratch[0]);
         if let Some((detector, motion)) = &self.right {
-            add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
+            look(detector, 1, motion.rotation.transpose() * attitude, &mut self.scratch[1]);
         }
     }
 
