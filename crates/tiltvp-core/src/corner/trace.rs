@@ -20,6 +20,10 @@ const GAP_MAX_PX: f64 = 12.0;
 /// together.
 const PROFILES_ENOUGH: f64 = 128.0;
 
+/// Most profiles along a ray, as a multiple of both sides of the image together: an arc through the middle of a circular image has 0.8 of
+/// that. A pinhole's pixels per radian grow without bound, so that a ray to its rim would be followed for ever.
+const PROFILES_SHARE_MAX: usize = 2;
+
 /// The first pixels of a ray. They separate it from an edge that begins elsewhere and happens to point at the vertex.
 /// Halved, the attitude of a real box turns more from frame to frame (0.238 instead of 0.206 degrees).
 const FIRST_PX: f64 = 20.0;
@@ -234,7 +238,8 @@ fn edge_points(
     let profile = &mut profile[..=2 * half];
     let window = SearchWindow::new(profile.len(), search.search_px);
     let (mut angle, mut looked_at) = (search.from_rad, 0_usize);
-    while angle <= search.to_rad {
+    let most = PROFILES_SHARE_MAX * (camera.width() + camera.height()) as usize;
+    while angle <= search.to_rad && looked_at < most {
         let (sin, cos) = angle.sin_cos();
         let crossing = search.profile_along(camera, along, [cos, sin]);
         let Some(RayProfile { pixel, across, pace, px_per_rad }) = crossing else { break };
@@ -290,6 +295,37 @@ fn keep_alike(places: &mut Vec<EdgePoint>, step_share_min: f64, first_px: f64, s
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{Model, Pinhole};
+
+    /// Along an arc whose covariance is that of its places alone.
+    const SEARCH: RaySearch = RaySearch {
+        normal: Vector3::new(0.0, 0.0, 1.0),
+        vertex: Vector3::new(1.0, 0.0, 0.0),
+        from_rad: 0.0,
+        to_rad: 0.2,
+        search_px: 2.5,
+        step_min: 1.0,
+        step_share_min: 0.0,
+        threshold_px: 0.7,
+        share_min: 0.0,
+        erring_together: 4.0,
+        ray_sigma_px: 0.0,
+    };
+
+    #[test]
+    fn a_ray_to_the_rim_of_a_pinhole_has_an_end() {
+        let lens = Pinhole::new([300.0; 2], [319.5, 239.5], &[]).unwrap();
+        let camera = Camera::new(640, 480, Model::Pinhole(lens)).unwrap();
+        let search = RaySearch { normal: Vector3::y(), vertex: Vector3::z(), to_rad: 2.0, ..SEARCH };
+        let looks = std::cell::Cell::new(0);
+        let signal = |_: &Vector2<f64>, _: &Vector2<f64>, _: &mut [f64]| {
+            looks.set(looks.get() + 1);
+            assert!(looks.get() < 10_000);
+            false
+        };
+        assert!(trace(&camera, &search, 20.0, signal, &mut TraceScratch::default()).is_none());
+        assert!(looks.get() > 100);
+    }
 
     /// Steps of the first ten profiles are 40; of the others one is too weak, one is of the other sign, and one comes after a gap.
     #[test]
@@ -312,19 +348,6 @@ mod tests {
 
     #[test]
     fn the_covariance_of_a_ray_is_that_of_its_places() {
-        let search = RaySearch {
-            normal: Vector3::z(),
-            vertex: Vector3::x(),
-            from_rad: 0.0,
-            to_rad: 0.2,
-            search_px: 2.5,
-            step_min: 1.0,
-            step_share_min: 0.0,
-            threshold_px: 0.7,
-            share_min: 0.0,
-            erring_together: 4.0,
-            ray_sigma_px: 0.0,
-        };
         let rad_per_px = 1e-3;
         let at = |angle: f64| [angle.cos(), angle.sin()];
         let places = || (0..100).map(|k| (at(0.002 * f64::from(k)), 1.0));
@@ -336,15 +359,15 @@ mod tests {
         let by_places = moments.try_inverse().unwrap() * 4.0;
         let variance = |rms: f64| rms * rms + (PLACE_SIGMA_MIN_PX * rad_per_px).powi(2);
         for rms in [0.0, 2e-4] {
-            let off = covariance(&search, 1.0, rms) / variance(rms) - by_places;
+            let off = covariance(&SEARCH, 1.0, rms) / variance(rms) - by_places;
             assert!(off.norm() < 1e-9 * by_places.norm(), "{off}");
         }
         // Places farther apart than profiles err together are independent of each other.
-        let apart = covariance(&search, 8.0, 2e-4) * 4.0 / variance(2e-4) - by_places;
+        let apart = covariance(&SEARCH, 8.0, 2e-4) * 4.0 / variance(2e-4) - by_places;
         assert!(apart.norm() < 1e-9 * by_places.norm());
         // Either end of the whole ray may be off.
-        let whole = RaySearch { ray_sigma_px: 0.2, ..search };
-        let more = covariance(&whole, 1.0, 0.0) - covariance(&search, 1.0, 0.0);
+        let whole = RaySearch { ray_sigma_px: 0.2, ..SEARCH };
+        let more = covariance(&whole, 1.0, 0.0) - covariance(&SEARCH, 1.0, 0.0);
         for end in [at(0.0), at(0.198)].map(Vector2::from) {
             assert!((end.dot(&(more * end)) - (0.2 * rad_per_px).powi(2)).abs() < 1e-15);
         }
