@@ -29,7 +29,10 @@ pub struct EdgeEnd {
 pub(crate) struct ObservedEnd {
     bearing: Vector3<f64>,
     sigma_rad: f64,
+    /// From the vertex, along the edge.
     length_m: f64,
+    /// From the camera.
+    distance_m: f64,
 }
 
 impl ObservedEnd {
@@ -41,8 +44,7 @@ impl ObservedEnd {
         let at_camera = away.angle(&self.bearing);
         // The sine rule: L / sin(angle at the camera) = d / sin(angle at the end).
         let sine = (vertex_m.norm() * at_camera.sin() / self.length_m).clamp(SINE_MIN, 1.0);
-        let end_m = (vertex_m.norm_squared() + self.length_m * self.length_m).sqrt();
-        let by_bearing = self.sigma_rad * end_m / sine;
+        let by_bearing = self.sigma_rad * self.distance_m / sine;
         let by_distance = away.dot(&(covariance_m2 * away)).sqrt() * self.length_m / vertex_m.norm();
         EdgeEnd { length_m: self.length_m, sigma_m: by_bearing.hypot(by_distance), place_m: None }
     }
@@ -158,7 +160,9 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
             let Some((_, line)) = together.max_by(|a, b| a.1.length_px().total_cmp(&b.1.length_px())) else { continue };
             let Some(bearing) = meeting(&whole.ray.normal, &line.normal, &seen.corner.vertex()) else { continue };
             if let Some(length_m) = along(&seen.vertex_m, &seen.edges[axis], &bearing) {
-                *out = Some(ObservedEnd { bearing, sigma_rad: seen.options.ray_sigma_px / px_per_rad, length_m });
+                let sigma_rad = seen.options.ray_sigma_px / px_per_rad;
+                let distance_m = (seen.vertex_m + seen.edges[axis] * length_m).norm();
+                *out = Some(ObservedEnd { bearing, sigma_rad, length_m, distance_m });
                 break;
             }
         }
@@ -217,17 +221,25 @@ pub(crate) fn edge_ends(
 mod tests {
     use super::*;
 
-    /// The length of an edge across the line of sight is the distance times the tangent of the angle at which its end is seen.
+    /// An edge across the line of sight, and edges that run towards the camera and away from it.
     #[test]
     fn a_length_from_one_image_errs_by_its_end_and_by_the_distance() {
-        let (distance_m, length_m, sigma_rad, sigma_m) = (2.0f64, 0.6f64, 1e-3, 4e-3);
-        let angle_rad = (length_m / distance_m).atan();
-        let end = ObservedEnd { bearing: Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()), sigma_rad, length_m };
+        let (vertex_m, length_m, sigma_rad, sigma_m) = (Vector3::new(0.0, 0.0, 2.0), 0.6, 1e-3, 4e-3);
         let covariance_m2 = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sigma_m * sigma_m));
-        let found = end.alone(&Vector3::new(0.0, 0.0, distance_m), &covariance_m2);
-        let by_bearing = sigma_rad * distance_m / angle_rad.cos().powi(2);
-        let by_distance = sigma_m * angle_rad.tan();
-        assert!((found.sigma_m - by_bearing.hypot(by_distance)).abs() < 1e-9, "{found:?}");
-        assert_eq!((found.length_m, found.place_m), (length_m, None));
+        for lean_rad in [0.0f64, -0.9, 0.9] {
+            let edge = Vector3::new(lean_rad.cos(), 0.0, lean_rad.sin());
+            let end_m = vertex_m + edge * length_m;
+            let told_m = |distance_m: f64, off_rad: f64| {
+                let angle_rad = end_m.x.atan2(end_m.z) + off_rad;
+                along(&(vertex_m * distance_m / 2.0), &edge, &Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()))
+                    .unwrap()
+            };
+            let by_bearing = (told_m(2.0, 1e-6) - told_m(2.0, -1e-6)) / 2e-6 * sigma_rad;
+            let by_distance = (told_m(2.0 + 1e-6, 0.0) - told_m(2.0 - 1e-6, 0.0)) / 2e-6 * sigma_m;
+            let end = ObservedEnd { bearing: end_m.normalize(), sigma_rad, length_m, distance_m: end_m.norm() };
+            let found = end.alone(&vertex_m, &covariance_m2);
+            assert!((found.sigma_m / by_bearing.hypot(by_distance) - 1.0).abs() < 1e-6, "{lean_rad}: {found:?}");
+            assert_eq!((found.length_m, found.place_m), (length_m, None));
+        }
     }
 }
