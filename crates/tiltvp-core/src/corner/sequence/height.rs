@@ -7,6 +7,7 @@ use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::with_vertex;
 use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
+use crate::filter::symmetric;
 
 /// The largest standard deviation of a distance as a share of it. Covariances are to first order; the next order is as much
 /// again of what they say, 1 % of the distance here. Larger ones are those of corners at the height of the camera.
@@ -97,9 +98,8 @@ fn placed(
     let by_attitude = -bearing * down.cross(&bearing).transpose() * (distance_m / drop);
     let by_height = bearing * (height_sigma_m / drop);
     let seen = corner.pencil.vertex_covariance;
-    // The attitude errs with the bearing of its own vertex; a mean of several corners does by this one's share of it.
     let (own, with) = with_vertex(corner, &pose.edges, gamma_sigma_rad)?;
-    let together = attitude * own.try_inverse()? * with;
+    let together = share_of_own(&attitude, &own)? * with;
     let mixed = by_attitude * together * by_bearing.transpose();
     let place = by_bearing * seen * by_bearing.transpose()
         + by_attitude * attitude * by_attitude.transpose()
@@ -114,4 +114,59 @@ fn placed(
     covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross.transpose());
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&place);
     (known && covariance.iter().all(|x| x.is_finite())).then_some((bearing * distance_m, covariance))
+}
+
+/// By how much an attitude errs with what the rays of one corner alone tell, from the covariances of both: a mean of several corners by this
+/// one's share of it, and by all of it where the attitude is worth less than these rays, as then its other errors are not theirs.
+fn share_of_own(attitude: &Matrix3<f64>, own: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let factor = own.cholesky()?.l();
+    let whitener = factor.try_inverse()?;
+    let mut shares = symmetric(&(whitener * attitude * whitener.transpose())).symmetric_eigen();
+    shares.eigenvalues.apply(|share| *share = share.min(1.0));
+    Some(factor * shares.recompose() * whitener)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Rotation3};
+
+    use super::*;
+    use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
+    use crate::corner::ray::FittedRay;
+
+    /// Of an attitude as its rays tell it, of one known better, and of those known worse in all directions and in one.
+    #[test]
+    fn a_place_by_height_has_a_covariance_however_well_the_attitude_is_known() {
+        let turn = Rotation3::from_euler_angles(0.5, 0.3, 0.2);
+        let vertex = Vector3::new(0.1, 0.8, 2.0);
+        let rays = [0, 1, 2].map(|axis| {
+            let end = vertex + turn * Vector3::ith(axis, 0.3);
+            let (normal, covariance) = (vertex.cross(&end).normalize(), Matrix2::identity() * 1e-8);
+            FittedRay { normal, covariance, toward: end.normalize(), support: 50, residual_rms_rad: 1e-4 }
+        });
+        let corner = CornerFeature::from_rays(rays).unwrap();
+        let found = corner_attitudes(&corner, &IncludedAngle::RIGHT).unwrap();
+        for own in found.iter() {
+            let about_up = own.edges[1] * own.edges[1].transpose() * 1e-3;
+            for attitude in
+                [own.covariance, own.covariance * 0.1, own.covariance * 6.25, own.covariance * 0.1 + about_up]
+            {
+                let mut covariance = Matrix6::zeros();
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&attitude);
+                let pose = Hypothesis {
+                    camera_from_object: own.camera_from_object,
+                    edges: own.edges,
+                    vertex_m: None,
+                    covariance,
+                    probability: 1.0,
+                    right_handed: true,
+                    misfit: 0.0,
+                };
+                let (_, covariance) = placed(&pose, &corner, (1.2, 0.0), 0.0).unwrap();
+                let units = Matrix6::from_diagonal(&covariance.diagonal().map(|variance| variance.sqrt().recip()));
+                let least = (units * covariance * units).symmetric_eigenvalues().min();
+                assert!(least > -1e-9, "{least}: {covariance}");
+            }
+        }
+    }
 }
