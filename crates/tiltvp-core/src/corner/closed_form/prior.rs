@@ -154,8 +154,20 @@ fn mixture(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
 /// attitude.
 const VARIANCE_MIN: f64 = 1e-24;
 
+/// By how much rounding may carry a variance below 0, as a share of the sum of all: some fifty products of three numbers each.
+pub(super) const ROUNDING: f64 = 1e-14;
+
 /// The squared Mahalanobis length of a rotation vector, and the logarithm of its density without the constant.
 pub(crate) fn gaussian(off: &Vector3<f64>, covariance: &Matrix3<f64>) -> (f64, f64) {
+    let rounding = ROUNDING * covariance.trace();
+    if (covariance - Matrix3::from_diagonal_element(rounding)).cholesky().is_none() {
+        // Known exactly in some direction: the cofactors of such a matrix, of which its inverse is made, are rounding.
+        let raised = covariance + Matrix3::from_diagonal_element(rounding.max(VARIANCE_MIN));
+        return raised.cholesky().map_or((f64::INFINITY, f64::NEG_INFINITY), |factor| {
+            let square = off.dot(&factor.solve(off));
+            (square, -0.5 * square - factor.l().diagonal().map(f64::ln).sum())
+        });
+    }
     let covariance = covariance + Matrix3::from_diagonal_element(VARIANCE_MIN);
     match covariance.try_inverse() {
         Some(inverse) => {
@@ -204,5 +216,15 @@ mod tests {
         let sum = own + covariance;
         let square = off.dot(&sum.lu().solve(&off).unwrap());
         assert!((found + 0.5 * (square + sum.determinant().ln())).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
+    fn an_attitude_that_is_known_but_for_one_turn_has_a_likelihood() {
+        for k in 0..200 {
+            let turn = Rotation3::new(Vector3::new(0.01, 0.02, -0.03) * f64::from(k));
+            let axis = turn * Vector3::new(0.3, 0.5, 0.8).normalize();
+            let (square, ln_density) = gaussian(&(axis * 0.01), &(axis * axis.transpose() * 0.1));
+            assert!((square / 1e-3 - 1.0).abs() < 0.1 && ln_density > 0.0, "{square} {ln_density}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::attitude::{CornerAttitude, CornerAttitudes};
-use super::prior::{AttitudePrior, gaussian, rotation_vector};
+use super::prior::{AttitudePrior, ROUNDING, gaussian, rotation_vector};
 use crate::error::Result;
 use crate::filter::{restored, symmetric};
 use crate::geometry::validate_rotation;
@@ -73,9 +73,6 @@ const PROBABILITY_MIN: f64 = 1e-9;
 
 /// Variance of a direction about which nothing is known, square radians: that of an angle uniform in (-pi, pi].
 const UNKNOWN: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
-
-/// By how much rounding may carry a variance below 0, as a share of the sum of all: some fifty products of three numbers each.
-const ROUNDING: f64 = 1e-14;
 
 /// A joint hypothesis about the views up to now.
 #[derive(Debug, Clone)]
