@@ -135,6 +135,24 @@ fn a_pair_that_passes_a_grey_cube_names_its_corners() {
 }
 
 #[test]
+fn an_image_of_the_other_kind_is_refused_and_nothing_has_happened() {
+    let colours = [0.0, BASELINE_M].map(cube::cube);
+    let greys = colours.each_ref().map(|image| grey(image));
+    let grey = |k: usize| Frame::Gray(ImageView::new(&greys[k], 320, 180, 320).unwrap());
+    let colour = |k: usize| Frame::Color(ColorView::new(&colours[k], 320, 180, 3 * 320).unwrap());
+    for (method, is_grey) in [("general", true), ("coloured", false)] {
+        let mut estimator = estimator(method, true, EstimatorOptions::default());
+        assert!(look(&mut estimator, &colours, is_grey).pose().is_some());
+        let before = estimator.clone();
+        let (own, other) = if is_grey { ([grey(0), grey(1)], colour(1)) } else { ([colour(0), colour(1)], grey(1)) };
+        for [left, right] in [[&other, &own[1]], [&own[0], &other]] {
+            assert!(estimator.observe(left, Some(right), &FrameKnowledge::default()).is_err());
+            assert_eq!(estimator.state(), before.state(), "{method}");
+        }
+    }
+}
+
+#[test]
 fn one_camera_has_the_place_by_what_it_knows() {
     let right_m = 0.03;
     let height_m = truth().column(1).dot(&vertex_m(right_m));

@@ -84,8 +84,25 @@ impl CornerDetector {
         }
     }
 
-    /// Refuses images of another size than the camera's.
-    pub(super) fn check(&self, (width, height): (usize, usize)) -> Result<()> {
+    /// Refuses images of another size than the camera's, and of another kind than the front end's.
+    pub(super) fn check(&self, frame: &Frame<'_>) -> Result<()> {
+        self.check_size(frame.size())?;
+        match (&self.options.method, frame) {
+            (CornerMethod::General(_), Frame::Gray(_))
+            | (CornerMethod::Coloured(_) | CornerMethod::Paper(_), Frame::Color(_)) => Ok(()),
+            _ => Err(self.wrong_kind()),
+        }
+    }
+
+    fn wrong_kind(&self) -> Error {
+        let expected = match &self.options.method {
+            CornerMethod::General(_) => "coloured or paper, for images in colour",
+            CornerMethod::Coloured(_) | CornerMethod::Paper(_) => "general, for grey images",
+        };
+        Error::argument("method", self.options.method.name(), expected)
+    }
+
+    fn check_size(&self, (width, height): (usize, usize)) -> Result<()> {
         let expected = (self.camera.width() as usize, self.camera.height() as usize);
         if (width, height) == expected {
             return Ok(());
@@ -108,7 +125,7 @@ impl CornerDetector {
         window: Option<&Window>,
         scratch: &mut CornerScratch,
     ) -> Result<Option<CornerFeature>> {
-        self.check((image.width(), image.height()))?;
+        self.check_size((image.width(), image.height()))?;
         let whole = Window { columns: 0..image.width(), rows: 0..image.height() };
         let window = window.map_or(whole.clone(), |window| Window {
             columns: window.columns.start.min(whole.columns.end)..window.columns.end.min(whole.columns.end),
@@ -121,9 +138,7 @@ impl CornerDetector {
             CornerMethod::Paper(options) => {
                 Ok(coloured::paper::find(&self.camera, image, options, &window, &mut scratch.coloured))
             }
-            CornerMethod::General(_) => {
-                Err(Error::argument("method", "general", "coloured or paper, for images in colour"))
-            }
+            CornerMethod::General(_) => Err(self.wrong_kind()),
         }
     }
 
@@ -153,9 +168,9 @@ impl CornerDetector {
         scratch: &mut CornerScratch,
         out: &mut Vec<CornerFeature>,
     ) -> Result<()> {
-        self.check((image.width(), image.height()))?;
+        self.check_size((image.width(), image.height()))?;
         let (CornerMethod::General(options), Some(detector)) = (&self.options.method, &self.segments) else {
-            return Err(Error::argument("method", self.options.method.name(), "general, for grey images"));
+            return Err(self.wrong_kind());
         };
         let Some(memory) = &mut scratch.general else {
             return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));

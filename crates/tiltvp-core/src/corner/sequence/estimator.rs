@@ -129,9 +129,9 @@ impl CornerPoseEstimator {
             let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
             return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
         }
-        self.left.check(left.size())?;
+        self.left.check(left)?;
         if let (Some((detector, _)), Some(right)) = (&self.right, right) {
-            detector.check(right.size())?;
+            detector.check(right)?;
         }
         self.known = *known;
         let right_from_left =
