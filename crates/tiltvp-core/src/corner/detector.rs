@@ -19,7 +19,7 @@ use crate::camera::Camera;
 use crate::edges::Mask;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
-use crate::image::{ColorView, ImageView, LightTable};
+use crate::image::{ColorView, ImageView, LightTable, check_size};
 use crate::segments::{Segment, SegmentDetector};
 
 /// Finds corners in single images of one camera.
@@ -102,17 +102,8 @@ impl CornerDetector {
         Error::argument("method", self.options.method.name(), expected)
     }
 
-    fn check_size(&self, (width, height): (usize, usize)) -> Result<()> {
-        let expected = (self.camera.width() as usize, self.camera.height() as usize);
-        if (width, height) == expected {
-            return Ok(());
-        }
-        let (w, h) = expected;
-        Err(Error::argument(
-            "image",
-            format!("{height} x {width} pixels"),
-            format!("{h} x {w} (rows x columns), as the camera's images"),
-        ))
+    fn check_size(&self, size: (usize, usize)) -> Result<()> {
+        check_size(size, (self.camera.width() as usize, self.camera.height() as usize))
     }
 
     /// The coloured cuboid's corner; at most one. `window` is the part of the image to look at, none for all of it.

@@ -9,3 +9,4 @@ pub use color::ColorView;
 pub use linear::LightTable;
 pub use smooth::Smoother;
 pub use view::ImageView;
+pub(crate) use view::check_size;

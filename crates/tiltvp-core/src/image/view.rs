@@ -2,6 +2,16 @@
 
 use crate::error::{Error, Result};
 
+/// Refuses an image of another size (width, height) than the camera's.
+pub(crate) fn check_size(of_image: (usize, usize), of_camera: (usize, usize)) -> Result<()> {
+    if of_image == of_camera {
+        return Ok(());
+    }
+    let [(width, height), (expected_width, expected_height)] = [of_image, of_camera];
+    let expected = format!("{expected_height} x {expected_width} (rows x columns), as the camera's images");
+    Err(Error::argument("image", format!("{height} x {width} pixels"), expected))
+}
+
 /// Rows of 8-bit grey levels borrowed from the caller; pixel `(u, v)` is column `u` of row `v`.
 #[derive(Debug, Clone, Copy)]
 pub struct ImageView<'a> {

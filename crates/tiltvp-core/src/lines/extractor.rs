@@ -16,7 +16,7 @@ use super::tables::LineTables;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
-use crate::image::ImageView;
+use crate::image::{ImageView, check_size};
 use crate::options::OptionValue;
 use crate::segments::{FinderScratch, SegmentFinder, SegmentOptions, Segments};
 
@@ -123,12 +123,7 @@ impl LineExtractor {
         if !serves {
             return Err(Error::argument("scratch", "that of another extractor", "one made by this extractor"));
         }
-        let (width, height) = (self.tables.width, self.tables.height);
-        if (image.width(), image.height()) == (width, height) {
-            return Ok(());
-        }
-        let got = format!("{} x {} pixels", image.height(), image.width());
-        Err(Error::argument("image", got, format!("{height} x {width} (rows x columns), as the camera's images")))
+        check_size((image.width(), image.height()), (self.tables.width, self.tables.height))
     }
 
     /// The vertical lines of an image, by rising bearing. `tilt` is the lean of the frame where it is known, and

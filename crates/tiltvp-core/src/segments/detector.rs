@@ -15,7 +15,7 @@ use super::segment::{EdgePoint, Segment, Segments};
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Extent, Prefilter, Region, RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
-use crate::image::ImageView;
+use crate::image::{ImageView, check_size};
 use crate::interrupt::check;
 
 /// Finds the straight edges of the region of a camera's images.
@@ -255,12 +255,8 @@ impl SegmentDetector {
         if !scratch.finder.serves(&self.region, &self.options.edges) {
             return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));
         }
-        let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
-        if (image.width(), image.height()) != (width, height) {
-            let got = format!("{} x {} pixels", image.height(), image.width());
-            let expected = format!("{height} x {width} (rows x columns), as the camera's images");
-            return Err(Error::argument("image", got, expected));
-        }
+        let size = (self.camera.width() as usize, self.camera.height() as usize);
+        check_size((image.width(), image.height()), size)?;
         let LeastGradients { each, one } = self.finder.gradients(self.options.edges.gradient_min);
         let gradients = LeastGradients { each: share * each, one: share * one };
         self.finder.find(image, &self.region, gradients, None, &mut scratch.finder, out);

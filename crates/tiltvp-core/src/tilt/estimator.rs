@@ -21,7 +21,7 @@ use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::validate_rotation;
-use crate::image::ImageView;
+use crate::image::{ImageView, check_size};
 use crate::interrupt::{Interrupt, check};
 
 /// Estimates the tilt of a robot from single images of one camera.
@@ -145,15 +145,8 @@ impl TiltEstimator {
     }
 
     fn check_image(&self, image: &ImageView<'_>) -> Result<()> {
-        let (width, height) = (self.camera().width() as usize, self.camera().height() as usize);
-        if (image.width(), image.height()) == (width, height) {
-            return Ok(());
-        }
-        Err(Error::argument(
-            "image",
-            format!("{} x {} pixels", image.height(), image.width()),
-            format!("{height} x {width} (rows x columns), as the camera's images"),
-        ))
+        let size = (self.camera().width() as usize, self.camera().height() as usize);
+        check_size((image.width(), image.height()), size)
     }
 
     /// The tilt of one image. An image without enough edges has an estimate without a tilt, not an error.
