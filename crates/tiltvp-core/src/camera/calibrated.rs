@@ -137,6 +137,11 @@ impl Camera {
         with_model!(&self.model, model => self.project_jacobian_by(model, bearing))
     }
 
+    /// Pixels per radian at a unit bearing, root mean square over directions in the image.
+    pub(crate) fn px_per_rad(&self, bearing: &Vector3<f64>) -> Option<f64> {
+        self.project_jacobian(bearing).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())
+    }
+
     /// [`unproject`](Self::unproject) with `d bearing / d pixel`.
     pub fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
         with_model!(&self.model, model => self.unproject_jacobian_by(model, pixel))

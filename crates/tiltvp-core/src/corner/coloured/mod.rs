@@ -91,7 +91,7 @@ pub(crate) fn find(
 ) -> Option<CornerFeature> {
     let lines = find_lines(camera, image, &options.lines, (options.label_step_px, LIFTED_MAX), window, scratch)?;
     let mut vertex = meeting_point(&lines);
-    let px_per_rad = camera.project_jacobian(&vertex).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())?;
+    let px_per_rad = camera.px_per_rad(&vertex)?;
     let [top, left, right] = options.lines.color.faces;
     let faces = [(top, right), (left, right), (top, left)];
     let mut searches = lines.map(|line| search_of(&line, &vertex, px_per_rad, options));

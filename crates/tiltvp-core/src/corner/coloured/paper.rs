@@ -67,9 +67,7 @@ pub(crate) fn find(
 fn missed_px(lines: &[PlaneLine; 3], point: &Vector2<f64>, camera: &Camera) -> Option<f64> {
     let missed = lines.iter().map(|line| (line.normal.dot(point) - line.offset).powi(2)).sum::<f64>();
     let bearing = Vector3::new(point.x, point.y, 1.0);
-    // The Jacobian is that of the unit bearing.
-    let (_, jacobian) = camera.project_jacobian(&bearing.normalize())?;
-    Some((missed / 3.0).sqrt() * jacobian.norm() / 2f64.sqrt() / bearing.norm())
+    Some((missed / 3.0).sqrt() * camera.px_per_rad(&bearing.normalize())? / bearing.norm())
 }
 
 /// Eq. 27: the point with the least sum of squared distances from the lines.

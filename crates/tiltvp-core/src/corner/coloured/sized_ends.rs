@@ -53,8 +53,7 @@ pub(in crate::corner) fn find_end(
     };
     let ray = view.corner.rays()[axis];
     let last = view.corner.vertex().angle(&ray.toward);
-    let Some((_, jacobian)) = view.camera.project_jacobian(&ray.toward) else { return Err(Unseen::Outside) };
-    let px_per_rad = jacobian.norm() / 2f64.sqrt();
+    let px_per_rad = view.camera.px_per_rad(&ray.toward).ok_or(Unseen::Outside)?;
     let candidates = OFFSETS_PX.map(|offset| last + offset / px_per_rad);
     let memory = &mut scratch.trace;
     view.end(axis, &candidates, &mut |line, search| match line {

@@ -86,10 +86,9 @@ pub(crate) fn beginnings(
     corner: &CornerFeature,
 ) -> Beginnings {
     let vertex = corner.vertex();
-    let Some((_, jacobian)) = camera.project_jacobian(&vertex) else {
+    let Some(px_per_rad) = camera.px_per_rad(&vertex) else {
         return Beginnings { steps: [None; 3], ..Beginnings::ALL };
     };
-    let px_per_rad = jacobian.norm() / 2f64.sqrt();
     let begins = |normal: &Vector3<f64>| {
         let on_circle = (vertex - normal * normal.dot(&vertex)).try_normalize(0.5)?;
         let search = gray_search(options, *normal, on_circle, [CLEAR_OF_VERTEX_PX / px_per_rad, 0.0]);

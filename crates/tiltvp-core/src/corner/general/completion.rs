@@ -69,8 +69,8 @@ impl CornerCompletion<'_> {
     pub(crate) fn run(&self, scratch: &mut GeneralScratch, out: &mut Vec<CornerFeature>) {
         let GeneralScratch { segments, trace: memory, .. } = scratch;
         for crossing in &self.crossings(&segments.list) {
-            let Some(place) = self.camera.project_jacobian(&crossing.place) else { continue };
-            self.complete(crossing, place.1.norm() / 2f64.sqrt(), &segments.list, memory, out);
+            let Some(px_per_rad) = self.camera.px_per_rad(&crossing.place) else { continue };
+            self.complete(crossing, px_per_rad, &segments.list, memory, out);
         }
     }
 

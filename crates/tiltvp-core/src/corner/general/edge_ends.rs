@@ -127,8 +127,7 @@ fn meetings<'a>(
 /// image shows the edge.
 pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch) -> [Option<ObservedEnd>; 3] {
     let mut out = [None; 3];
-    let Some((_, jacobian)) = seen.camera.project_jacobian(&seen.corner.vertex()) else { return out };
-    let px_per_rad = jacobian.norm() / 2f64.sqrt();
+    let Some(px_per_rad) = seen.camera.px_per_rad(&seen.corner.vertex()) else { return out };
     let GeneralScratch { segments, trace: memory, .. } = scratch;
     for (axis, out) in out.iter_mut().enumerate() {
         let found = meetings(seen, &segments.list, axis, px_per_rad);

@@ -119,11 +119,10 @@ pub(crate) fn find_near(
     for (search_px, stride_px, share_min) in
         [(search_px, 3.0, 0.5 * options.guided_min_share), (options.search_px, 1.0, options.guided_min_share)]
     {
-        let pixel = camera.project_jacobian(&vertex)?;
-        if !camera.contains(&pixel.0) {
+        if !camera.contains(&camera.project(&vertex)?) {
             return None;
         }
-        let px_per_rad = pixel.1.norm() / 2f64.sqrt();
+        let px_per_rad = camera.px_per_rad(&vertex)?;
         let mut rays = [None; 3];
         let lengths = expected.far.map(|far| vertex.angle(&far));
         // Where one ray is missing none of the others is needed, and the shortest is the soonest looked at.

@@ -113,10 +113,6 @@ impl BoxView<'_> {
         (vertex - normal * normal.dot(&vertex)).normalize()
     }
 
-    fn px_per_rad(&self, bearing: &Vector3<f64>) -> Option<f64> {
-        self.camera.project_jacobian(bearing).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())
-    }
-
     /// Both edges that begin at the end, if they meet the ray in one place.
     fn far_edges(
         &self,
@@ -129,7 +125,7 @@ impl BoxView<'_> {
         let others = [(axis + 1) % 3, (axis + 2) % 3];
         let mut far = None;
         for search_px in SEARCH_PX {
-            let px_per_rad = self.px_per_rad(&bearing)?;
+            let px_per_rad = self.camera.px_per_rad(&bearing)?;
             let mut ends = [Vector3::zeros(); 2];
             let mut rays = [None; 2];
             for ((end, found), along) in ends.iter_mut().zip(&mut rays).zip(others) {
@@ -155,7 +151,7 @@ impl BoxView<'_> {
 
     /// Whether the edge is seen up to its end, and not beyond it.
     fn ends_at(&self, end: &SeenEnd, follow: &mut dyn FnMut(BoxLine, &RaySearch) -> Option<TracedRay>) -> bool {
-        let Some(px_per_rad) = self.px_per_rad(&end.bearing) else { return false };
+        let Some(px_per_rad) = self.camera.px_per_rad(&end.bearing) else { return false };
         let angle = self.on_ray(end.axis).angle(&end.bearing);
         let mut share = |from_px: f64, to_px: f64| {
             let (from_rad, to_rad) = (angle + from_px / px_per_rad, angle + to_px / px_per_rad);
@@ -170,7 +166,7 @@ impl BoxView<'_> {
     /// Whether the edge is followed up to the border of the image.
     fn leaves(&self, axis: usize) -> bool {
         let far = self.corner.rays()[axis].toward;
-        let Some(px_per_rad) = self.px_per_rad(&far) else { return true };
+        let Some(px_per_rad) = self.camera.px_per_rad(&far) else { return true };
         let beyond = self.at(axis, self.on_ray(axis).angle(&far) + LAST_PX / px_per_rad);
         let [width, height] = [self.camera.width(), self.camera.height()].map(f64::from);
         self.camera.project(&beyond).is_none_or(|pixel| {
