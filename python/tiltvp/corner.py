@@ -228,7 +228,7 @@ def poses(
     `left_from_right` is the (4, 4) rigid motion, metres, that takes points of the right camera's frame to the left
     one's; the cameras may be of any kind. The interpretations are told apart by the agreement of the two views, by
     `right_handed` and by `priors` (left camera's frame). With `fuse` the six rays are fused by least squares from
-    there. Empty where either feature is no corner of that angle, and where the vertex is before neither camera.
+    there. Empty where either feature is no corner of that angle, and where the vertex is not before both cameras.
     """
     _checked([left, right])
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)

@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::ray::FittedRay;
+use super::ray::{FittedRay, VARIANCE_MIN};
+use super::triangulation::BearingObservation;
 use crate::filter::chi_square_cdf;
-use crate::geometry::{tangent_basis, unit};
+use crate::geometry::{RigidMotion, tangent_basis, unit};
 
 /// An edge of a corner, in the order in which rays are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -77,9 +78,6 @@ pub(super) fn length_score(lengths: &[f64; 3]) -> f64 {
     let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
     shortest + LENGTH_SHARE * lengths.iter().map(|length| length.min(LENGTH_ENOUGH_PX)).sum::<f64>()
 }
-
-/// The least variance of a plane's distance from the vertex, square radians: that of rounding, (1e-15 rad)^2.
-const VARIANCE_MIN: f64 = 1e-30;
 
 /// The least sine of an angle between two planes that have a vertex in common: below it rounding turns the vertex by
 /// more than 1e-7 rad.
@@ -204,6 +202,11 @@ impl CornerFeature {
     /// Covariance of the vertex in square radians, in the plane of [`tangent_basis`] at it.
     pub fn vertex_covariance(&self) -> Matrix2<f64> {
         self.vertex_covariance
+    }
+
+    /// The vertex as a camera of a rig observes it.
+    pub(super) fn vertex_observation(&self, rig_from_camera: RigidMotion) -> BearingObservation {
+        BearingObservation { bearing: self.vertex, covariance: self.vertex_covariance, rig_from_camera }
     }
 
     /// Root mean square of the vertex' distances from the three great circles, radians.

@@ -34,9 +34,6 @@ const STEPS_MAX: usize = 8;
 /// image resolves (1e-7).
 const CONVERGED: f64 = 1e-10;
 
-/// Variance below which rounding is what is left, square radians: (1e-15 rad)^2.
-const VARIANCE_MIN: f64 = 1e-30;
-
 /// Moves a pose to the least squares of the rays of all cameras, each by its covariance, and of the included angle if it has
 /// a standard deviation above 0; `side` is 1 if the edge z is on the side of the object's z axis (a right-handed corner),
 /// else -1.
@@ -212,11 +209,10 @@ impl LinearSystem {
 
 /// The inverse covariances of the rays of each camera.
 fn weights(cameras: &[(&CornerFeature, RigidMotion)]) -> Option<Vec<[Matrix2<f64>; 3]>> {
-    let floor = Matrix2::from_diagonal_element(VARIANCE_MIN);
     let of = |feature: &CornerFeature| {
         let mut weights = [Matrix2::zeros(); 3];
         for (weight, ray) in weights.iter_mut().zip(feature.rays()) {
-            *weight = (ray.covariance + floor).try_inverse()?;
+            *weight = ray.information()?;
         }
         Some(weights)
     };

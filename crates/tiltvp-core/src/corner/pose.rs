@@ -8,7 +8,7 @@ use super::closed_form::resolve::{Alignment, View, resolve};
 use super::closed_form::standard_model::CornerCase;
 use super::feature::CornerFeature;
 use super::fusion::fuse_rays;
-use super::triangulation::{BearingObservation, triangulate};
+use super::triangulation::triangulate;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 
@@ -86,7 +86,7 @@ pub(crate) fn check_baseline(left_from_right: &RigidMotion) -> Result<()> {
 /// Every pose that explains the features of both cameras, the likeliest first; their probabilities add up to 1, but for those below 1e-9
 /// that are left out.
 ///
-/// Empty where either feature is no corner of that angle (or hand), and where the vertex is before neither camera.
+/// Empty where either feature is no corner of that angle (or hand), and where the vertex is not before both cameras.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle, priors or a mounting that are none, and for cameras at one
@@ -105,15 +105,8 @@ pub fn corner_poses(
         View { attitudes: &of_right, common_from_camera: left_from_right.rotation },
     ];
     let resolved = resolve(&views, Alignment::Same, options.right_handed, &options.priors)?;
-    let observation = |feature: &CornerFeature, rig_from_camera| BearingObservation {
-        bearing: feature.vertex(),
-        covariance: feature.vertex_covariance(),
-        rig_from_camera,
-    };
-    let Some(vertex) = triangulate(&[observation(left, RigidMotion::identity()), observation(right, *left_from_right)])
-    else {
-        return Ok(Vec::new());
-    };
+    let seen = [left.vertex_observation(RigidMotion::identity()), right.vertex_observation(*left_from_right)];
+    let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
     let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
     let poses = resolved.iter().filter_map(|resolved| {
         let chosen: &CornerAttitude = of_left.get(*resolved.choice.first()?)?;

@@ -25,6 +25,9 @@ pub struct FittedRay {
 /// The sum of the variances, the same in any basis but for rounding, in square radians: beyond it products of two are none of a float.
 const VARIANCES_MAX: f64 = 1e150 * (1.0 + 1e-9);
 
+/// Variance below which rounding is what is left, square radians: (1e-15 rad)^2.
+pub(super) const VARIANCE_MIN: f64 = 1e-30;
+
 impl FittedRay {
     /// The weighted fit to unit bearings with the standard deviation of each across the ray, radians; `toward` is a bearing
     /// near the far end, which is moved onto the circle.
@@ -81,6 +84,11 @@ impl FittedRay {
     pub fn covariance_3d(&self) -> Matrix3<f64> {
         let basis = tangent_basis(&self.normal);
         basis * self.covariance * basis.transpose()
+    }
+
+    /// The inverse of the covariance, of which no variance is below that of rounding.
+    pub(super) fn information(&self) -> Option<Matrix2<f64>> {
+        (self.covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).try_inverse()
     }
 
     /// Whether every number is finite, the bearings of unit length and the variances not negative nor above 1e150.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use super::ray::VARIANCE_MIN;
 use crate::filter::symmetric;
 use crate::geometry::{RigidMotion, tangent_basis};
 
@@ -31,9 +32,6 @@ pub struct TriangulatedPoint {
 /// Gauss-Newton steps from the point nearest to the lines of sight. Convergence is quadratic from a start that is a few
 /// standard deviations off; a step below rounding ends it earlier.
 const STEPS: usize = 6;
-
-/// Variance of a bearing below which rounding is what is left, square radians: (1e-15 rad)^2.
-const VARIANCE_MIN: f64 = 1e-30;
 
 /// The point with the least sum of squared misses of the bearings, each by its covariance.
 ///

@@ -31,7 +31,7 @@ impl IncludedAngle {
     }
 
     /// cos gamma, exactly 0 for the right angle.
-    fn cosine(&self) -> f64 {
+    pub(super) fn cosine(&self) -> f64 {
         if self.gamma_rad == FRAC_PI_2 { 0.0 } else { self.gamma_rad.cos() }
     }
 }

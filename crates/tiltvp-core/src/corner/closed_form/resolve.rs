@@ -164,15 +164,7 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
     };
     match alignment {
         Alignment::Same => consider(single.rotation),
-        Alignment::Manhattan => {
-            for quarter in 0..4 {
-                let turn =
-                    Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-                for over in [Matrix3::identity(), Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))] {
-                    consider(single.rotation * turn.matrix() * over);
-                }
-            }
-        }
+        Alignment::Manhattan => namings().for_each(|naming| consider(single.rotation * naming)),
         Alignment::Vertical => {
             let vertical = joint.rotation.column(1).into_owned();
             let own = single.rotation.column(1) * single.rotation.column(1).dot(&vertical).signum();
@@ -198,6 +190,13 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
         chi_square: joint.chi_square + chi_square,
         choice,
     }
+}
+
+/// The eight namings of a corner with right angles: quarter turns about the vertical, and the vertical up or down.
+pub(crate) fn namings() -> impl Iterator<Item = Matrix3<f64>> {
+    let quarter = |k: i32| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * std::f64::consts::FRAC_PI_2);
+    let over = [Matrix3::identity(), Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))];
+    (0..4).flat_map(move |k| over.map(|over| quarter(k).matrix() * over))
 }
 
 /// The likeliest first, without the negligible.

@@ -48,12 +48,10 @@ impl Screening {
     pub fn of(feature: &CornerFeature, angle: &IncludedAngle) -> Result<Self> {
         angle.validate()?;
         let projected = Projected::of(&feature.pencil);
-        let gamma = angle.gamma_rad;
-        let cosine = if gamma == FRAC_PI_2 { 0.0 } else { gamma.cos() };
-        if roots(&projected, cosine).iter().flatten().next().is_some() {
+        if roots(&projected, angle.cosine()).iter().flatten().next().is_some() {
             return Ok(Self::Passes);
         }
-        let standard = StandardType::of(feature, gamma);
+        let standard = StandardType::of(feature, angle.gamma_rad);
         let smallest = standard.vertical_rad[0].min(standard.vertical_rad[1]);
         Ok(if smallest >= FRAC_PI_2 {
             Self::HorizontalAngle { projected_rad: standard.horizontal_rad, least_rad: standard.gamma_rad }

@@ -43,6 +43,10 @@ const ERRING_TOGETHER: f64 = 2.0;
 /// shading within a factor of two aside. Doubled, the cuboid is lost.
 const STEP_SHARE_MIN: f64 = 0.5;
 
+/// From the vertex candidates lie on one side, but for a few that the gap's width brings about: the share of the longer side that the
+/// shorter one may have.
+const NEAR_SHARE_MAX: f64 = 0.3;
+
 /// The part of an image that is looked at.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Window {
@@ -250,8 +254,7 @@ fn search_of(
     let [low, high] = line.reach.map(|angle| angle - at);
     let forwards = high.abs() >= low.abs();
     let (near, far) = if forwards { (low, high) } else { (-high, -low) };
-    // Seen from the vertex the candidates lie on one side, but for a few that the gap's width brings about.
-    if near < -0.3 * far || far <= 0.0 {
+    if near < -NEAR_SHARE_MAX * far || far <= 0.0 {
         return None;
     }
     Some(RaySearch {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::{CandidateLine, ColouredScratch, Window, find_lines};
+use super::{CandidateLine, ColouredScratch, NEAR_SHARE_MAX, Window, find_lines};
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::options::PaperOptions;
@@ -110,10 +110,6 @@ fn ray_through(
         residual_rms_rad: line.rms_rad,
     })
 }
-
-/// From the vertex the midpoints lie on one side, but for a few that the gap's width brings about: the share of the longer side that
-/// the shorter one may have.
-const NEAR_SHARE_MAX: f64 = 0.3;
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::junctions::{RayEnd, meeting};
+use super::junctions::{RayEnd, are_clockwise, meeting};
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_END_PX, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
@@ -194,9 +194,5 @@ pub(super) fn clockwise(&[x, y, z]: &[FittedRay; 3]) -> Option<CornerFeature> {
     let corner = CornerFeature::from_rays([x, y, z])?;
     let vertex = corner.vertex();
     let along = corner.rays().map(|ray| ray.normal.cross(&vertex));
-    let turn = |direction: &Vector3<f64>| {
-        let angle = vertex.dot(&along[1].cross(direction)).atan2(along[1].dot(direction));
-        if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
-    };
-    if turn(&along[0]) > turn(&along[2]) { Some(corner) } else { CornerFeature::from_rays([z, y, x]) }
+    if are_clockwise(&vertex, &along) { Some(corner) } else { CornerFeature::from_rays([z, y, x]) }
 }

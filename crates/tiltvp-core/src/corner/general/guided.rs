@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::edge_ends::along;
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{CLEAR_OF_VERTEX_PX, gray_search};
@@ -43,19 +44,8 @@ impl ExpectedCorner {
         let vertex = corner.vertex() * distance_m;
         let mut far = [Vector3::zeros(); 3];
         for ((far, ray), edge) in far.iter_mut().zip(corner.rays()).zip(edges) {
-            // The point of the edge that is seen at the far end: vertex + s edge, along `toward`.
-            let across = (
-                Vector3::from(vertex) - ray.toward * ray.toward.dot(&vertex),
-                edge - ray.toward * ray.toward.dot(edge),
-            );
-            let length_m = -across.0.dot(&across.1) / across.1.norm_squared();
-            if !(length_m > 0.0 && length_m.is_finite()) {
-                return None;
-            }
-            let point = vertex + edge * length_m;
-            if point.dot(&ray.toward) <= 0.0 {
-                return None;
-            }
+            // The point of the edge that is seen at the far end.
+            let point = vertex + edge * along(&vertex, edge, &ray.toward)?;
             *far = other_from_own.point(&point).try_normalize(1e-9)?;
         }
         Some(Self { vertex: other_from_own.point(&vertex).try_normalize(1e-9)?, far })

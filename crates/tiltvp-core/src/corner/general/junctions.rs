@@ -57,7 +57,7 @@ pub(crate) fn find(
     segments: &[Segment],
     vertical: Option<&Vector3<f64>>,
     options: &GeneralOptions,
-    meetings: &mut Vec<Vec<(usize, Vector3<f64>, f64)>>,
+    meetings: &mut Vec<Vec<(usize, Meeting)>>,
     out: &mut Vec<Junction>,
 ) {
     out.clear();
@@ -74,9 +74,9 @@ pub(crate) fn find(
             if (place - other_place).norm() > reach + other_reach {
                 continue;
             }
-            if let Some(Meeting { place, gap_share, .. }) = meeting(segments, *a, *b, options) {
-                meetings[i].push((j, place, gap_share));
-                meetings[j].push((i, place, gap_share));
+            if let Some(met) = meeting(segments, *a, *b, options) {
+                meetings[i].push((j, met));
+                meetings[j].push((i, met));
             }
         }
     }
@@ -86,8 +86,8 @@ pub(crate) fn find(
         if vertical.is_some_and(|vertical| segment.normal.dot(vertical).abs() > sine) {
             continue;
         }
-        for (k, (j, place, gap)) in meetings[i].iter().enumerate() {
-            for (l, other_place, other_gap) in meetings[i].iter().skip(k + 1) {
+        for (k, (j, Meeting { place, gap_share })) in meetings[i].iter().enumerate() {
+            for (l, Meeting { place: other_place, gap_share: other_gap_share }) in meetings[i].iter().skip(k + 1) {
                 let px_per_rad = segment.px_per_rad;
                 // No angle is below its chord.
                 let is_near = |away_rad: f64| away_rad * px_per_rad <= 2.0 * LOOSE_PX;
@@ -99,7 +99,8 @@ pub(crate) fn find(
                 if rays[0].segment == rays[2].segment || between < apart {
                     continue;
                 }
-                if let Some(junction) = junction(camera, segments, rays, px_per_rad, gap + other_gap, place) {
+                if let Some(junction) = junction(camera, segments, rays, px_per_rad, gap_share + other_gap_share, place)
+                {
                     out.push(junction);
                 }
             }
@@ -110,7 +111,7 @@ pub(crate) fn find(
 }
 
 /// How far before its begin a segment may meet another one, in pixels.
-fn widest_px(segment: &Segment, options: &GeneralOptions) -> f64 {
+pub(super) fn widest_px(segment: &Segment, options: &GeneralOptions) -> f64 {
     options.gap_max_px.max(options.gap_max_share * segment.length_px())
 }
 
@@ -149,6 +150,15 @@ pub(crate) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
     Some(Meeting { place, gap_share })
 }
 
+/// Whether the rays x, y, z are clockwise in the image, by their directions at the vertex: about the line of sight from y come z, then x.
+pub(super) fn are_clockwise(vertex: &Vector3<f64>, along: &[Vector3<f64>; 3]) -> bool {
+    let turn = |direction: &Vector3<f64>| {
+        let angle = vertex.dot(&along[1].cross(direction)).atan2(along[1].dot(direction));
+        if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
+    };
+    turn(&along[0]) > turn(&along[2])
+}
+
 /// The junction of three rays that meet in pairs.
 fn junction(
     camera: &Camera,
@@ -168,12 +178,7 @@ fn junction(
         return None;
     }
     let along = rays.map(|ray| vertex.cross(ray.far(segments)).cross(&vertex));
-    // Clockwise about the line of sight from y come z, then x.
-    let turn = |direction: &Vector3<f64>| {
-        let angle = vertex.dot(&along[1].cross(direction)).atan2(along[1].dot(direction));
-        if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
-    };
-    let rays = if turn(&along[0]) > turn(&along[2]) { rays } else { [rays[2], rays[1], rays[0]] };
+    let rays = if are_clockwise(&vertex, &along) { rays } else { [rays[2], rays[1], rays[0]] };
     let lengths = rays.map(|ray| segments[ray.segment].length_px());
     Some(Junction { rays, vertex, score: length_score(&lengths) / (1.0 + gap_share) })
 }

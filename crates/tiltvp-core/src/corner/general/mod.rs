@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 pub(super) use self::sized_ends::{box_search, find_end};
 
-use self::junctions::{Junction, RayEnd};
+use self::junctions::{Junction, Meeting, RayEnd, widest_px};
 use super::feature::CornerFeature;
 use super::options::GeneralOptions;
 use super::trace::{RaySearch, TraceScratch, TracedRay, trace};
@@ -63,7 +63,8 @@ pub(crate) struct GeneralScratch {
     detector: SegmentScratch,
     /// The straight edges of the last image, the longest first.
     pub(crate) segments: Segments,
-    meetings: Vec<Vec<(usize, Vector3<f64>, f64)>>,
+    /// For each end of a segment the others that it meets.
+    meetings: Vec<Vec<(usize, Meeting)>>,
     junctions: Vec<Junction>,
     /// For each end of a segment, the vertices from which its ray was followed, and what came of it.
     traced: Vec<Vec<(Vector3<f64>, Option<TracedRay>)>>,
@@ -193,7 +194,7 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
     let angle_of = |bearing: &Vector3<f64>| bearing.dot(&along).atan2(bearing.dot(&on_line));
     let px_per_rad = segment.px_per_rad;
     let mut to_rad = angle_of(ray.far(segments));
-    let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px()) / px_per_rad;
+    let gap_rad = widest_px(segment, options) / px_per_rad;
     let in_line = |other: &&Segment| other.ends.iter().all(|end| normal.dot(end).abs() * px_per_rad < SAME_LINE_PX);
     let in_line: Vec<[f64; 2]> = segments
         .iter()

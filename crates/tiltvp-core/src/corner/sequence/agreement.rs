@@ -1,10 +1,10 @@
 //! Which features of one image are corners of one upright world: those whose attitudes agree.
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::Matrix3;
 
 use crate::corner::closed_form::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
-use crate::corner::closed_form::resolve::ResolvedAttitude;
+use crate::corner::closed_form::resolve::{ResolvedAttitude, namings};
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::common_attitude::PARALLEL_SIGMA_RAD;
 use crate::error::Result;
@@ -23,13 +23,6 @@ const PIXELS_PER_NAT: f64 = 30.0;
 /// the 99.9 % of three degrees of freedom, and 10 of 24 from one corner; with it 3 and 4.
 const SCATTER: f64 = 2.5;
 const SCATTER_FREEDOM: f64 = 3.0;
-
-/// The eight namings of a corner with right angles: quarter turns about the vertical, and the vertical up or down.
-pub(crate) fn namings() -> impl Iterator<Item = Matrix3<f64>> {
-    let quarter = |k: i32| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * std::f64::consts::FRAC_PI_2);
-    let over = [Matrix3::identity(), Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))];
-    (0..4).flat_map(move |k| over.map(|over| quarter(k).matrix() * over))
-}
 
 /// The naming of an attitude that is nearest to another attitude.
 pub(crate) fn renamed(attitude: &Matrix3<f64>, near: &Matrix3<f64>) -> Matrix3<f64> {

@@ -15,7 +15,7 @@ use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
 use crate::corner::fusion::{FusedPose, KnownAttitude, fuse_rays, fuse_rays_with};
 use crate::corner::general::common_attitude::CommonAttitude;
-use crate::corner::triangulation::{BearingObservation, triangulate};
+use crate::corner::triangulation::triangulate;
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
@@ -57,12 +57,7 @@ impl CornerPoseEstimator {
         misfit_most: f64,
     ) -> Result<Vec<Hypothesis>> {
         let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
-        let observation = |corner: &CornerFeature, rig_from_camera| BearingObservation {
-            bearing: corner.vertex(),
-            covariance: corner.vertex_covariance(),
-            rig_from_camera,
-        };
-        let seen = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
+        let seen = [left.vertex_observation(RigidMotion::identity()), right.vertex_observation(*left_from_right)];
         let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
         // All rays together miss by no less than the vertices alone. Most pairs are of different corners, and end here.
         let freedom = Freedom::of([left, right]);

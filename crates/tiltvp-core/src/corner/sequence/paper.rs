@@ -6,7 +6,7 @@ use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::corner_attitudes;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::{CornerEstimate, Hypothesis};
-use crate::corner::triangulation::{BearingObservation, midpoint};
+use crate::corner::triangulation::midpoint;
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
@@ -30,13 +30,9 @@ impl CornerPoseEstimator {
             View { attitudes: &of_left, common_from_camera: Matrix3::identity() },
             View { attitudes: &of_right, common_from_camera: left_from_right.rotation },
         ];
-        let [seen_left, seen_right] =
-            [(left, RigidMotion::identity()), (right, *left_from_right)].map(|(corner, rig_from_camera)| {
-                BearingObservation { bearing: corner.vertex(), covariance: corner.vertex_covariance(), rig_from_camera }
-            });
+        let seen = [left.vertex_observation(RigidMotion::identity()), right.vertex_observation(*left_from_right)];
         let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
-        let Some(vertex) =
-            midpoint(&[seen_left, seen_right]).filter(|vertex| (nearest..=farthest).contains(&vertex.point_m.norm()))
+        let Some(vertex) = midpoint(&seen).filter(|vertex| (nearest..=farthest).contains(&vertex.point_m.norm()))
         else {
             return Ok(());
         };

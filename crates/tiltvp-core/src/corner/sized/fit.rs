@@ -20,9 +20,6 @@ const STEPS_MAX: usize = 12;
 /// resolves (1e-7).
 const CONVERGED: f64 = 1e-10;
 
-/// Variance below which rounding is what is left, square radians: (1e-15 rad)^2.
-const VARIANCE_MIN: f64 = 1e-30;
-
 /// What is known of the lengths of the edges x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct KnownLengths {
@@ -144,9 +141,8 @@ struct Line {
 fn lines(corner: &CornerFeature, ends: &[(SeenEnd, f64)]) -> Option<Vec<Line>> {
     let own = corner.rays().iter().enumerate().map(|(along, ray)| (along, None, *ray));
     let far = ends.iter().flat_map(|(end, _)| end.far.map(|(along, ray)| (along, Some(end.axis), ray)));
-    let floor = Matrix2::from_diagonal_element(VARIANCE_MIN);
     let line = |(along, end_of, ray): (usize, Option<usize>, FittedRay)| {
-        Some(Line { along, end_of, ray, weight: (ray.covariance + floor).try_inverse()? })
+        Some(Line { along, end_of, ray, weight: ray.information()? })
     };
     own.chain(far).map(line).collect()
 }
