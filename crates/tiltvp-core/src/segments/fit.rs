@@ -52,8 +52,7 @@ impl Frame {
         Some(Self { normal, middle, along: normal.cross(&middle) })
     }
 
-    /// One step of least squares of the points within `limit` pixels: the normal and the root mean square distance of those
-    /// before the step, and how many there are.
+    /// One step of least squares of the points within `limit` pixels: the normal, and how many of these there are.
     #[inline(always)]
     fn step(&self, points: &[EdgePoint], limit: f64) -> Option<(Vector3<f64>, usize)> {
         let (mut information, mut pull, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0);

@@ -182,8 +182,7 @@ fn covariance(
     if held <= 2 {
         // Two great circles always meet: their residuals are zero and tell nothing.
         spread = stated;
-    }
-    if held > 2 {
+    } else {
         // Few residuals hardly tell how far normals stray: what is stated counts as `STATED` of them.
         let free = held as f64 - 2.0;
         spread = (spread * held as f64 + stated * STATED) / (free + STATED);

@@ -99,12 +99,12 @@ fn meetings<'a>(
 ) -> Vec<(f64, &'a Segment)> {
     let (vertex, normal) = (seen.corner.vertex(), seen.corner.rays()[axis].normal);
     let along = normal.cross(&vertex);
+    // The axis of an edge is the column that is nearest to it.
+    let own = seen.camera_from_object.tr_mul(&seen.edges[axis]).abs().imax();
     let mut out = Vec::new();
     for segment in segments {
         let sines = seen.camera_from_object.tr_mul(&segment.normal).abs();
         let nearest = sines.imin();
-        // The axis of an edge is the column that is nearest to it.
-        let own = seen.camera_from_object.tr_mul(&seen.edges[axis]).abs().imax();
         if nearest == own || sines[nearest] > AXIS_SINE {
             continue;
         }
