@@ -27,7 +27,7 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     ("words", "told"),
     [
         ("tilt x.png --camera camera.toml --margin-px 500",
-         "--elevation-min-deg, --elevation-max-deg = 0, 45 degrees (0, 0.785 radians), expected a band that some "
+         "--elevation-min-deg, --elevation-max-deg = 0, 45 degrees, expected a band that some "
          "pixel of the camera sees: check --robot-from-camera, the mask and the margin"),
         ("tilt x.png --camera camera.toml --image-size 640x480",
          "camera.toml: the image is 256x256, expected the 640x480 of --image-size, at camera[0]"),
@@ -37,9 +37,9 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
          "camera.toml: no keys to read (a str at the top), expected named values, at the top (read as kalibr, and it "
          "is of tiltvp)"),
         ("corner x.png --calibration camera.toml --gamma 1.57",
-         "--gamma = 1.57 degrees (0.0274017 radians), expected an angle from 0.1 to 3 rad"),
+         "--gamma = 1.57 degrees, expected an angle from 5.73 to 171.9 degrees"),
         ("corner x.png --calibration camera.toml --faces red,green",
-         "--faces red,green, expected one of r, g and b for each face, as rgb"),
+         "--faces = 'red,green', expected the letters r, g and b, each once, in any order"),
         ("camera scale camera.toml out.toml --to 0x0", "--to '0x0', expected WIDTHxHEIGHT in pixels, such as 640x480"),
         ("calibrate bearings.csv wheels.csv --wheel-base 0.4",
          "bearings.csv, line 1: no column 'delta_left_m', expected step, time_s, delta_left_m, delta_right_m"),

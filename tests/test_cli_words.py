@@ -136,10 +136,17 @@ def test_cameras_of_a_recording(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ("--tilt-max-deg 400", "--tilt-max-deg = 400 degrees (6.98132 radians), expected an angle above 0 and at most"),
+        (
+            "--tilt-max-deg 400",
+            "--tilt-max-deg = 400 degrees, expected an angle above 0 and at most 180, below 90 degrees but",
+        ),
         (
             "--elevation-max-deg -1",
-            "(-0.0174533 radians), expected an angle above --elevation-min-deg and at most pi/2",
+            "= -1 degrees, expected an angle above --elevation-min-deg and at most 90 degrees",
+        ),
+        (
+            "--method vector-consensus --correction x",
+            "expected none, a number (a factor) or a file of `tiltvp lab train`",
         ),
         ("--camera-format x", ", at --format or --camera-format"),
         ("--gradient-min -1", "tiltvp: --gradient-min = -1, expected a positive gradient magnitude"),
@@ -162,6 +169,20 @@ def test_options_are_called_as_they_are_typed(run: Run, world: Path, words: str,
     assert told in said.complaint
 
 
+def test_reasons_are_told_by_what_is_typed(run: Run, world: Path) -> None:
+    out = world / "tilts.csv"
+    said = run("tilt", world / "images", "--camera", world / "camera.toml", "--tilt-max-deg", "1", "--out", out)
+    assert "beyond the limit of 1.0 degrees" in " ".join(said.out.split())
+    assert "raise --tilt-max-deg" in " ".join(said.out.split())
+    assert "raise tilt_max_rad" in out.read_text()
+
+
+def test_help_says_what_a_word_may_be(run: Run) -> None:
+    told = " ".join(run("corner", "--help").out.replace("│", " ").split())
+    assert "Expected the letters r, g and b, each once, in any order. Default rgb." in told
+    assert "Expected either, upright or upside-down. Default either." in told
+
+
 def test_a_robot_of_millimetres_is_refused(run: Run, world: Path, camera: tiltvp.Camera) -> None:
     tiltvp.Robot(camera, np.eye(3), wheels=Wheels(wheel_base_m=0.35)).save(world / "robot.toml")
     text = (world / "robot.toml").read_text()
@@ -175,7 +196,7 @@ def test_a_robot_of_millimetres_is_refused(run: Run, world: Path, camera: tiltvp
     ("words", "told"),
     [
         ("--to same", "--field-of-view-deg: given with --to same, expected it with fisheye or pinhole only"),
-        ("--to pinhole", "--field-of-view-deg = 400 degrees (6.98132 radians), expected an angle in (0, "),
+        ("--to pinhole", "--field-of-view-deg = 400 degrees, expected an angle in (0, 180) degrees of a pinhole"),
     ],
 )
 def test_the_view_of_level_images_is_called_as_it_is_typed(run: Run, world: Path, words: str, told: str) -> None:

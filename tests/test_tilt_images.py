@@ -100,7 +100,7 @@ def test_a_lean_beyond_the_largest_one_is_not_sure(camera: tiltvp.Camera, render
         cut, wide = (tiltvp.TiltEstimator(camera, tilt_max_rad=limit)(room.gray) for limit in (None, 0.35))
         assert cut.alpha_rad < math.radians(degrees)
         assert cut.confidence <= 0.5
-        assert "beyond tilt_max_rad (0.175, 10 degrees)" in cut.reason
+        assert "beyond the limit of 10.0 degrees" in cut.reason
         assert "tilt_max_rad" not in wide.reason
 
 

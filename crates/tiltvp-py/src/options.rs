@@ -147,7 +147,7 @@ fn annotation(kind: Kind) -> String {
         Kind::Bool => "bool".to_owned(),
         Kind::Int(_) => "int".to_owned(),
         Kind::Float => "float".to_owned(),
-        Kind::Text => "str".to_owned(),
+        Kind::Text(_) => "str".to_owned(),
         Kind::Word(words) => {
             let words: Vec<String> = words.iter().map(|word| format!("{word:?}")).collect();
             format!("Literal[{}]", words.join(", "))

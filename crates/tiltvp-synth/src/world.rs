@@ -164,7 +164,7 @@ impl World {
         if self.contains(&center) {
             return Ok(center);
         }
-        let got = format!("{:?} at height {} m", view.pose, center.z);
+        let got = format!("x {:.2} m, y {:.2} m, height {:.2} m", center.x, center.y, center.z);
         Err(Error::argument("view.pose", got, "a place in the room"))
     }
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from cyclopts import Group, Parameter
 
+from tiltvp.cli.option_words import typed
 from tiltvp.cli.options import Switch, rotation_of
 from tiltvp.cli.tables import check_file, check_plot, finite
 from tiltvp.cli.terminal import complain, new_table, say, show
@@ -253,7 +254,7 @@ def _show(one: Calibration, *, several: bool) -> None:
         table.add_row(name, *cells)
     show(table)
     for name, reason in (("filter", filtered.reason), ("whole log", one.reason)):
-        say(f"{name}: {reason}")
+        say(f"{name}: {typed(reason)}")
     e = whole.mounting
     say(
         f"whole log: {whole.bearings} bearings, {whole.outliers} outliers, residual {whole.residual_rms:.2f} sigma, "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.option_words import typed
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
 from tiltvp.errors import InvalidInputError, counted
@@ -90,5 +91,5 @@ def _show(found: Sequence[ImageGravity], database: Path) -> None:
     if reasons:
         table = new_table(None, ("images", "without gravity, because"), ("without gravity, because",))
         for reason, count in reasons.most_common():
-            table.add_row(str(count), reason)
+            table.add_row(str(count), typed(reason))
         show(table)

@@ -66,8 +66,6 @@ class CornerOptions(LibraryOptions):
             if self._has(option) and not any(map(self._has, owners)):
                 raise InvalidInputError(f"{option} without {' or '.join(owners)}, expected both")
         known = {"gamma_rad": math.radians(self.gamma)} | super().given()
-        if sorted(known.get("faces", "rgb")) != ["b", "g", "r"]:
-            raise InvalidInputError(f"--faces {known['faces']}, expected one of r, g and b for each face, as rgb")
         if self.pitch is not None:
             if "down" in known:
                 raise InvalidInputError("--pitch and --down: expected one of them")

@@ -6,6 +6,7 @@ library.
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -112,6 +113,11 @@ def _help(field: Mapping[str, Any], defaults: Mapping[str | None, str], *, sever
         .replace("in radians", "in degrees")
         .replace("radians", "degrees")
     )
+    expected = field["expected"].replace('"', "")
+    if field["type"].startswith(("Literal", "str")) and not all(
+        word in doc for word in re.findall(r"[\w-]+", expected)
+    ):
+        doc = f"{doc} Expected {expected}."
     if len(set(defaults.values())) == 1:
         only = "" if not several or len(defaults) > 1 else f"{next(iter(defaults))}: "
         return f"{only}{doc} Default {next(iter(defaults.values()))}."

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.cli.cluster import Task, on_cluster
 from tiltvp.cli.filtering import FilterOptions, Judge
+from tiltvp.cli.option_words import typed
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.sources import ending_at_interrupt, picture_names
@@ -154,7 +155,7 @@ class Levelling:
         if estimate is None:
             return str(outcome.error)
         if not estimate:
-            return f"no tilt: {estimate.reason}"
+            return f"no tilt: {typed(estimate.reason)}"
         if outcome.filtered is not None:
             return f"no filtered tilt: {outcome.filtered.reason if outcome.accepted else outcome.verdict_reason}"
         return f"its tilt is not believed, confidence {estimate.confidence:.2f}"

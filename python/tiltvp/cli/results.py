@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tiltvp.cli.option_words import typed
 from tiltvp.cli.tables import Table, finite
 from tiltvp.cli.terminal import new_table
 from tiltvp.errors import counted
@@ -165,7 +166,7 @@ def _people_row(outcome: Outcome) -> dict[str, str]:
         return row
     angles = {name: degrees(getattr(e, f"{name}_rad")) for name in ("alpha", "beta", "roll", "pitch")}
     row |= {f"{name} deg": words for name, words in angles.items()}
-    row |= {"confidence": f"{e.confidence:.3f}", "1-sigma deg": degrees(sigma_rad(e)), "reason": e.reason}
+    row |= {"confidence": f"{e.confidence:.3f}", "1-sigma deg": degrees(sigma_rad(e)), "reason": typed(e.reason)}
     return row | {
         "edges px": str(e.edge_pixels),
         "inliers px": str(e.inlier_pixels),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import re
 import sys
@@ -103,39 +102,17 @@ def complain(problem: str) -> None:
 
 def _line(problem: str) -> str:
     """One line, in the words of the command line where the library speaks of its arguments."""
-    words = _of_option(" ".join(problem.split()))
+    from tiltvp.cli.option_words import of_option
+
+    words = of_option(" ".join(problem.split()))
     words = words.replace("image_size=(width, height) from the caller", "--image-size WIDTHxHEIGHT")
     words = words.replace(" of image_size=", " of --image-size")
     words = words.replace("format= to say which", "--format or --camera-format to say which")
     words = words.replace(", at format=", ", at --format or --camera-format")
     words = re.sub(r"given with to='(\w+)'", r"given with --to \1", words)
     words = re.sub(r"^(parent|child) = ", r"--\1-frame = ", words)
+    words = re.sub(r"^joints = ", "--wheel-joints = ", words)
     return f"tiltvp: {words}{_remedy(words)}"
-
-
-def _of_option(problem: str) -> str:
-    """What is wrong with an option of the library, by the names and in the degrees that are typed; else as it is."""
-    pattern = r"(?:option |(?=field_of_view_rad\b))(\w+)(?:, (\w+))?(?: = (\[[^]]*\]|[^ ,]+),)?(?=[ :])"
-    found = re.match(pattern, problem)
-    if found is None:
-        return problem
-    from tiltvp.cli.declared_options import KEYWORDS, flag_of, is_angle
-
-    (keyword, second, value), rest = found.groups(), problem[found.end() :]
-    told = "" if value is None else f" = {value},"
-    if value is not None and is_angle(keyword):
-        digits = ".6g" if second is None else ".3g"
-        radians = [float(one) for one in value.strip("[]").split(",")]
-        degrees = ", ".join(f"{math.degrees(one):{digits}}" for one in radians)
-        told = f" = {degrees} degrees ({', '.join(f'{one:{digits}}' for one in radians)} radians),"
-    # Words in quotes are values, and such as "mask" are words of sentences too, but for those of a list of names.
-    before, listed, names = rest.partition(", expected one of ")
-    if before.startswith(": unknown"):
-        names = ", ".join(map(flag_of, names.split(", ")))
-    typed = r'"[^"]*"|\b([a-z]+(?:_[a-z]+)+)\b(?:=True)?'
-    rest = re.sub(typed, lambda word: flag_of(word[1]) if word[1] in KEYWORDS else word[0], before + listed + names)
-    flags = ", ".join(map(flag_of, filter(None, (keyword, second))))
-    return f"{flags}{told}{rest}"
 
 
 def _remedy(problem: str) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from tiltvp.cli.cluster import Task, on_cluster
 from tiltvp.cli.filtering import FilterOptions
+from tiltvp.cli.option_words import typed
 from tiltvp.cli.results import Outcome, degrees, outcome_table
 from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import say
@@ -101,7 +102,7 @@ def words_of(estimate: TiltEstimate, title: str) -> str:
     """One line about an estimate, of the letters that pictures can show."""
     name = title.encode("ascii", "replace").decode()
     if not estimate:
-        return f"{name}: no tilt, {estimate.reason}"
+        return f"{name}: no tilt, {typed(estimate.reason)}"
     angles = f"alpha {degrees(estimate.alpha_rad)} deg, beta {degrees(estimate.beta_rad, 1)} deg"
     return f"{name}: {angles}, confidence {estimate.confidence:.3f}, {estimate.inlier_pixels} inliers"
 

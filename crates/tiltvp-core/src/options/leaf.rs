@@ -70,7 +70,7 @@ impl OptionValue for bool {
 }
 
 impl OptionValue for String {
-    const KIND: Kind = Kind::Text;
+    const KIND: Kind = Kind::Text("a text");
 
     fn to_value(&self) -> Value {
         Value::Text(self.clone())

@@ -86,8 +86,8 @@ pub enum Kind {
     Int(u64),
     /// A number.
     Float,
-    /// A text.
-    Text,
+    /// A text: what is accepted, in words.
+    Text(&'static str),
     /// One of some words.
     Word(&'static [&'static str]),
     /// An array of numbers of that shape, 0 for any length.
@@ -106,9 +106,9 @@ impl fmt::Display for Kind {
         match self {
             Self::Bool => write!(f, "True or False"),
             Self::Int(u64::MAX) => write!(f, "a whole number from 0 to 2^64 - 1"),
-            Self::Int(_) => write!(f, "a whole number from 0"),
+            Self::Int(most) => write!(f, "a whole number from 0 to {most}"),
             Self::Float => write!(f, "a number"),
-            Self::Text => write!(f, "a text"),
+            Self::Text(words) => write!(f, "{words}"),
             Self::Word(words) => {
                 for (i, word) in words.iter().enumerate() {
                     let before = if i == 0 {

@@ -110,7 +110,8 @@ impl fmt::Display for Stop {
             }
             Self::TooFew { have, need } => write!(f, "too few observations: {have}, at least {need} needed"),
             Self::OutOfReach { angle_rad, limit_rad } => {
-                write!(f, "an angle of {angle_rad:.3} rad was found, beyond the limit of {limit_rad:.3} rad")
+                let (angle, limit) = (angle_rad.to_degrees(), limit_rad.to_degrees());
+                write!(f, "an angle of {angle:.1} degrees was found, beyond the limit of {limit:.1} degrees")
             }
             Self::Chosen { probability, of } => {
                 write!(f, "the most probable of {of} directions (probability {probability:.2})")

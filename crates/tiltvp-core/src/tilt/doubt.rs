@@ -68,8 +68,7 @@ impl fmt::Display for Doubt {
             }
             Self::Beyond { limit_rad } => write!(
                 f,
-                "the lean is beyond tilt_max_rad ({:.3}, {:.0} degrees) and may be larger than it seems: raise tilt_max_rad",
-                limit_rad,
+                "the lean is beyond the limit of {:.1} degrees and may be larger than it seems: raise tilt_max_rad",
                 limit_rad.to_degrees()
             ),
             Self::OnGrid { share } => write!(

@@ -12,7 +12,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from tiltvp.cli.declared_options import Whole
-from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads, rotation_of
 from tiltvp.csv_files import LARGEST_CSV_BYTES
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import keeps_existing, read_text
@@ -70,12 +70,11 @@ class LensOptions:
     def rotation(self) -> NDArray[np.float64] | None:
         """(3, 3) `robot_from_camera`, where it was given or a robot's file tells it."""
         from tiltvp.robot import is_robot
-        from tiltvp.rotations import read_rotation
 
         source = self.robot_from_camera
         if source is None and self.camera is not None and is_robot(self.camera):
             source = str(self.camera)
-        return None if source is None else read_rotation(source)
+        return None if source is None else rotation_of(source)
 
     @property
     def source(self) -> dict[str, str]:

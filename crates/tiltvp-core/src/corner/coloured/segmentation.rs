@@ -36,14 +36,14 @@ fn different_faces(options: &ColorOptions) -> Result<()> {
     let [top, left, right] = options.faces;
     if top == left || left == right || top == right {
         let shown = options.faces.to_value();
-        return Err(Error::option("faces", shown, "three different colours of r, g and b: top, left, right"));
+        return Err(Error::option("faces", shown, <[Primary; 3]>::KIND.to_string()));
     }
     Ok(())
 }
 
 /// The letters of the top, the left and the right face.
 impl OptionValue for [Primary; 3] {
-    const KIND: Kind = Kind::Text;
+    const KIND: Kind = Kind::Text("the letters r, g and b, each once, in any order");
 
     fn to_value(&self) -> Value {
         Value::Text(self.map(Primary::letter).into_iter().collect())

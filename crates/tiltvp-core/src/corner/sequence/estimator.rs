@@ -66,7 +66,7 @@ impl CornerPoseEstimator {
         if let CornerMethod::Paper(_) = left.options().method
             && let Some(scale) = options.scales().iter().find(|scale| **scale != "camera_height_m")
         {
-            return Err(Error::argument(scale, "given for method \"paper\"", "none, or method \"coloured\""));
+            return Err(Error::argument(scale, "a length for method \"paper\"", "none, or method \"coloured\""));
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
         Ok(Self {

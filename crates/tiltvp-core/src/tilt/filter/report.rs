@@ -152,6 +152,7 @@ impl FilteredTilt {
 impl fmt::Display for FilteredTilt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verb = if self.tilt.is_some() { "within" } else { "beyond" };
-        write!(f, "standard deviation {:.4} rad, {verb} the limit of {:.4} rad", self.sigma_rad, self.sigma_max_rad)
+        let (sigma, limit) = (self.sigma_rad.to_degrees(), self.sigma_max_rad.to_degrees());
+        write!(f, "standard deviation {sigma:.2} degrees, {verb} the limit of {limit:.2} degrees")
     }
 }
