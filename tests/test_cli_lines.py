@@ -125,8 +125,8 @@ def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
     assert run("track", *files, *words[2:], *odometry)[:2] == (0, said)
     assert pl.read_csv(out).equals(table)
     again = tmp_path / "again.csv"
-    code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
-    assert (code, complaints) == (0, "")
+    # The lines that are drawn into it may speak against the lens.
+    assert run("track", film, "--camera", folder / "camera.toml", "--out", again)[0] == 0
     assert pl.read_csv(again)["file"][0] == f"{film}#0"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from drawn_corners import LEFT_FROM_RIGHT
 from tiltvp.images import image_size
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import open_frames
+from tiltvp.synth import Room
 
 EACH = ("tilt", "segments", "lines", "track --out tracks.csv", "level --out level")
 AT_ONCE = ("setup --out robot.toml", "mount")
@@ -28,6 +30,21 @@ SIZED += "`tiltvp camera scale FILE OUT --to 120x90` makes one that fits"
 def rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rooms")
     write_rooms(folder, 8)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """camera.toml, images of five rooms by it, and other.toml of a lens with another centre."""
+    folder = tmp_path_factory.mktemp("places")
+    shape = {"width": 240, "height": 180, "focal_px": 52.4, "max_theta_rad": math.radians(92.5)}
+    camera = tiltvp.Camera.equidistant(**shape, cx=119.5, cy=89.5)
+    camera.save(folder / "camera.toml")
+    tiltvp.Camera.equidistant(**shape, cx=129.5, cy=79.5).save(folder / "other.toml")
+    for seed in range(5):
+        room = Room("office", seed)
+        [pose] = room.free_poses(1, seed)
+        tiltvp.write_image(folder / "images" / f"{seed}.png", room.render(camera, pose=pose, seed=seed).bgr)
     return folder
 
 
@@ -127,9 +144,23 @@ def test_images_that_are_no_panoramas_are_not_levelled_one_by_one(run: Run, fold
     assert not (folder / "level").exists()
 
 
-@pytest.mark.parametrize("verb", ["mount --level-floor", f"calibrate {ODOMETRY}"])
+OUT = "--overwrite --out"
+
+
+@pytest.mark.parametrize(
+    "verb", ["mount --level-floor", f"calibrate {ODOMETRY}", f"level {OUT} level", "lines", f"track {OUT} tracks.csv"]
+)
 def test_it_is_said_where_images_speak_against_the_mounting(run: Run, folder: Path, verb: str) -> None:
     words = (*verb.split(), "images", "--camera", "camera.toml")
     assert "--robot-from-camera" not in run(*words).err
     told = run(*words, "--robot-from-camera", "forward").err
     assert told.startswith("tiltvp: --robot-from-camera: 5 images: up is the camera's +z (it looks up; ")
+
+
+@pytest.mark.parametrize("verb", ["segments", "lines"])
+def test_it_is_said_where_edges_speak_against_the_calibration(run: Run, places: Path, verb: str) -> None:
+    assert run(verb, places / "images", "--camera", places / "camera.toml").err == ""
+    said = run(verb, places / "images", "--camera", places / "other.toml")
+    assert (said.code, said.err.count("\n")) == (0, 1)
+    assert said.err.startswith("tiltvp: --camera: ")
+    assert "straight edges are bent, as by another lens: its centre" in said.err

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
+from tiltvp.cli.frame_checks import tell_setup_of
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Out, check_ending
 from tiltvp.cli.terminal import progress_bar
@@ -18,7 +19,8 @@ from tiltvp.files import check_output_folder
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Camera
+    from tiltvp.lines import LineExtractor
+    from tiltvp.segments import SegmentDetector
 
     Image = NDArray[Any]
 
@@ -52,21 +54,23 @@ class FoundOptions:
 def find_in_each(
     images: list[str] | None,
     source: SourceOptions,
-    camera: Camera,
+    finder: LineExtractor | SegmentDetector,
     look: Callable[[Image], Found],
     results: FoundOptions,
     draw: Callable[[Image, Found], Image],
     *,
     beside: Sequence[Path | None],
 ) -> tuple[list[tuple[str, Found]], bool]:
-    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; whether all went well.
+    """What `look` finds by a `finder` in each gray frame, with its name, drawn into a folder if asked; whether all
+    went well.
 
     No output takes the place of what is read `beside` the images.
     """
     from tiltvp.images import gray_from, write_image
 
-    frames, overlay = source.open(images or [], camera), results.overlay
+    frames, overlay = source.open(images or [], finder.camera), results.overlay
     check_apart(frames, overlay, results.out, beside=beside)
+    tell_setup_of(frames, finder)
     found: list[tuple[str, Found]] = []
     well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images", told=frames.told) as bar:

@@ -12,7 +12,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import TiltEstimator, _core
+    from tiltvp.lines import LineExtractor
+    from tiltvp.segments import SegmentDetector
     from tiltvp.streams import Frames
+
+    Mounted = TiltEstimator | LineExtractor
 
 __all__ = ["check_panoramas", "check_sizes", "tell_setup", "tell_setup_of"]
 
@@ -53,7 +57,7 @@ def check_panoramas(frames: Frames) -> None:
             raise InvalidInputError(f"{found}, expected one, or 360-degree panoramas, twice as wide as high")
 
 
-def tell_setup(images: Sequence[NDArray[Any]], estimator: TiltEstimator, mask: NDArray[Any] | None) -> None:
+def tell_setup(images: Sequence[NDArray[Any]], estimator: Mounted, mask: NDArray[Any] | None) -> None:
     """A line on stderr where images from different places speak against the mounting or the calibration."""
     from tiltvp import check_setup
 
@@ -63,13 +67,21 @@ def tell_setup(images: Sequence[NDArray[Any]], estimator: TiltEstimator, mask: N
         complain(f"{suspect}: {found.reason}")
 
 
-def tell_setup_of(frames: Frames, estimator: TiltEstimator) -> None:
-    """`tell_setup` of a few frames, spread over a source that can be read again."""
+def tell_setup_of(frames: Frames, finder: Mounted | SegmentDetector) -> None:
+    """`tell_setup` of a few frames, spread over a source that can be read again; of the calibration alone where edges
+    are looked for whichever way the camera is mounted."""
+    from tiltvp import check_lens
     from tiltvp.robot_setup import LEAST, spread
+    from tiltvp.segments import SegmentDetector
 
-    images = [image for _, image in spread(frames, estimator.camera, LEAST)]
-    if len(images) == LEAST:
-        tell_setup(images, estimator, estimator.options["mask"])
+    mask = finder.options["mask"]
+    images = [image for _, image in spread(frames, finder.camera, LEAST)]
+    if len(images) < LEAST:
+        return
+    if not isinstance(finder, SegmentDetector):
+        tell_setup(images, finder, mask)
+    elif not (found := check_lens(images, finder.camera, mask=mask)):
+        complain(f"--camera: {found.reason}")
 
 
 def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:

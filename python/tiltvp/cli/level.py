@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.frame_checks import check_panoramas
+from tiltvp.cli.frame_checks import check_panoramas, tell_setup_of
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
@@ -121,6 +121,8 @@ def level(
         motion.refuse("--filter")
     moved = motion.motions_of(robot, frames) if fused else None
     filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
+    if looks.camera is not None and looks.camera.model != "equirectangular":
+        tell_setup_of(frames, looks.of(looks.camera.width, looks.camera.height).estimator)
     work = Levelling(looks, filtering, copy_unlevelled)
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:

@@ -40,7 +40,7 @@ def lines(
     found, well = find_in_each(
         images,
         source,
-        lens,
+        extractor,
         lambda gray: extractor(gray, tilt(gray)),
         results,
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),

@@ -54,7 +54,7 @@ def segments(
     found, well = find_in_each(
         images,
         source,
-        lens,
+        detector,
         detector,
         results,
         lambda gray, seen: draw_segments(gray, lens, seen),

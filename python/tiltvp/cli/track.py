@@ -14,6 +14,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.each_image import Images
+from tiltvp.cli.frame_checks import tell_setup_of
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions, FrameRate
@@ -100,6 +101,7 @@ def track(
     frames = frames_of.open(words, lens)
     check_apart(frames, video, out, plot, beside=(motion.odometry, options.mask, camera.camera))
     motions = needed_turns(motion.motions_of(robot, frames))
+    tell_setup_of(frames, extractor)
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, watching.viewer() as viewer:
