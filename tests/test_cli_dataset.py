@@ -153,7 +153,7 @@ def test_wrong_use(run: Run, world: Path, tmp_path: Path, words: tuple[str, ...]
 def test_panoramas_of_rooms_replace_nothing(run: Run, tmp_path: Path) -> None:
     for words in (("--rooms", "0"), ("--places", "0")):
         code, _, complaints = run("panoramas", "--out", tmp_path / "out", *words)
-        assert (code, f"{words[0][2:]} = 0, expected 1 or more" in complaints) == (2, True)
+        assert (code, f"for {words[0]}. Must be >= 1." in complaints) == (2, True)
     (tmp_path / "INDEX.csv").write_text("mine")
     code, _, complaints = run("panoramas", "--out", tmp_path, "--rooms", "1", "--places", "1", "--height", "16")
     assert (code, "exists, expected a new or empty folder" in complaints) == (2, True)
@@ -173,7 +173,10 @@ def test_findings_are_a_table(run: Run, tmp_path: Path) -> None:
     assert (code, complaints) == (1, "")
     for words in ("unknown key 'mirrored' (did you mean mirror?)", "no such file", "no file 'a.png'", "expected"):
         assert words in said
-    assert run("check", tmp_path / "nothing")[0] == 1
+    missing = (
+        f"tiltvp: {tmp_path}/nothing: is no folder, expected a dataset: a folder with dataset.toml and images.csv\n"
+    )
+    assert run("check", tmp_path / "nothing") == (2, "", missing)
 
 
 @pytest.mark.timeout(60)

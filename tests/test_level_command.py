@@ -205,7 +205,7 @@ def test_what_a_filter_does_not_tell_is_not_laid_to_the_image(
     assert "b.png: no filtered tilt: the odometry does not tell of its time; left out\n" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["level.mkv", "level.png"])
+@pytest.mark.parametrize("name", ["level.mkv", "level.png", "level.gif"])
 def test_a_file_of_another_ending_is_no_folder(
     name: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -247,9 +247,18 @@ def test_folders_that_may_not_be_written_to_are_refused_before_any_work(
     monkeypatch.setattr(os, "access", lambda place, _: place != str(tmp_path))
     for check in (check_output, check_output_folder):
         with pytest.raises(OutputError, match=f"its folder {tmp_path} may not be written to"):
-            check(tmp_path / "new" / "out.csv")
+            check(tmp_path / "new" / "out")
         (tmp_path / "open").mkdir(exist_ok=True)
-        check(tmp_path / "open" / "new" / "out.csv")
+        check(tmp_path / "open" / "new" / "out")
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.PNG", "a.mkv", "a.csv", "a.json", "a.parquet", "a.html"])
+def test_the_name_of_a_file_is_no_folder_unless_it_is_there(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="as a file does, expected a folder"):
+        check_output_folder(tmp_path / name)
+    (tmp_path / name).mkdir()
+    for folder in (tmp_path / name, tmp_path / "v0.2", tmp_path / "2026-05-01.run"):
+        check_output_folder(folder)
 
 
 @pytest.mark.parametrize("value", [10**400, 10**5000, "1", [1.0], object()], ids=type)

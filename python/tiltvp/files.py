@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import mimetypes
 import os
 import re
 import stat
@@ -21,16 +22,20 @@ __all__ = [
     "check_output_folder",
     "check_replacing",
     "check_toml",
+    "is_file_name",
     "keeping_existing",
     "keeps_existing",
     "read_bytes",
     "read_text",
+    "refuse_file_name",
     "scratch_folder",
     "whole_file",
     "whole_folder",
     "write_whole",
 ]
 
+_OTHER_FILES: Final = (".jp2", ".json", ".m4v", ".mcap", ".mkv", ".parquet", ".pdf", ".toml", ".yaml")
+"""Endings of files that `mimetypes` does not know, or not by what they are."""
 _HEX: Final = re.compile("[0-9a-f]{16}")
 _KEEPS: Final[ContextVar[bool]] = ContextVar("keeps", default=False)
 
@@ -115,16 +120,31 @@ def check_replacing(what: str) -> None:
 
 
 def check_output_folder(path: str | os.PathLike[str]) -> None:
-    """Refuses a file, a folder that is to be kept: one that holds anything, and one that may not be written to.
+    """Refuses a file, or its name, a folder that is to be kept: one that holds anything, and one that may not be
+    written to.
 
     Raises `InvalidInputError` or `OutputError`.
     """
     folder = path_from(path)
+    refuse_file_name(folder)
     _check_writable(folder)
     if folder.exists() and not folder.is_dir():
         raise InvalidInputError(f"{folder}: is a file, expected a folder")
     if keeps_existing() and folder.is_dir() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder}: exists, expected a new or empty folder, or --overwrite to replace it")
+
+
+def refuse_file_name(folder: Path) -> None:
+    """Refuses the name of a file for a folder that is to be made. Raises `InvalidInputError`."""
+    if is_file_name(folder):
+        raise InvalidInputError(f"{folder}: ends in {folder.suffix!r} as a file does, expected a folder")
+
+
+def is_file_name(path: Path) -> bool:
+    """Whether a name is that of a picture, a video, a text or data, and no folder that is there."""
+    kind, _ = mimetypes.MimeTypes().guess_type(path.name, strict=False)
+    known = (kind or "").startswith(("image/", "video/", "text/")) or path.suffix.lower() in _OTHER_FILES
+    return known and not path.is_dir()
 
 
 def _check_writable(path: Path) -> None:

@@ -18,7 +18,7 @@ from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, wheel_base_of
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
-from tiltvp.files import check_output, check_output_folder
+from tiltvp.files import check_output, check_output_folder, is_file_name
 from tiltvp.levelling import View
 
 _OUTPUT = Group("What is shown")
@@ -138,13 +138,10 @@ def level(
 
 def _is_video(out: Path) -> bool:
     """Whether a video is written, not a folder. Raises `InvalidInputError` for the name of a file that is neither's."""
-    from tiltvp.streams.image_files import IMAGE_ENDINGS
-    from tiltvp.streams.video_files import VIDEO_ENDINGS
     from tiltvp.videos import CODECS
 
-    ending = out.suffix.lower()
-    if out.is_dir() or ending not in (*CODECS, *VIDEO_ENDINGS, *IMAGE_ENDINGS):
+    if not is_file_name(out):
         return False
-    if ending not in CODECS:
+    if out.suffix.lower() not in CODECS:
         raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected {' or '.join(CODECS)}, or a folder")
     return True

@@ -9,7 +9,7 @@ from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
 from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
-from tiltvp.cli.options import Switch
+from tiltvp.cli.options import AtLeast1, Switch
 from tiltvp.cli.root import group
 from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
 from tiltvp.errors import counted
@@ -35,7 +35,10 @@ def check(directory: Path, /) -> int:
     from tiltvp.lab.datasets.findings import Findings
     from tiltvp.lab.datasets.folder import find_dataset
 
-    dataset = find_dataset(directory, Findings())
+    first = Findings()
+    dataset = find_dataset(directory, first)
+    if not directory.is_dir():
+        first.refuse()
     with progress_bar(len(dataset.images) if dataset is not None else 0, "images") as bar:
         findings = check_dataset(directory, bar.advance)
     if findings:
@@ -61,7 +64,7 @@ def check(directory: Path, /) -> int:
 
 
 @app.command
-def panoramas(*, out: Path, rooms: Whole = 4, places: Whole = 2, height: Whole = 640, seed: Whole = 0) -> None:
+def panoramas(*, out: Path, rooms: AtLeast1 = 4, places: AtLeast1 = 2, height: Whole = 640, seed: Whole = 0) -> None:
     """Render upright panoramas of rooms, with the index that folders of panoramas have.
 
     Parameters
@@ -138,8 +141,8 @@ def synth(
     lens: LensOptions = _LENS,
     *,
     kinds: Words = None,
-    rooms: Whole = 6,
-    locations_per_room: Whole = 4,
+    rooms: AtLeast1 = 6,
+    locations_per_room: AtLeast1 = 4,
     camera_height_m: float | None = None,
     tilts_deg: Words = None,
     noise_sigma: NoiseSigma = 2.0,

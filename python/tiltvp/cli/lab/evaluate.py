@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
 from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.files import refuse_file_name
 
 if TYPE_CHECKING:
     import polars as pl
@@ -51,6 +52,7 @@ def evaluate(
     from tiltvp.lab.evaluation.combinations import choose
     from tiltvp.lab.evaluation.experiment import open_experiment
 
+    refuse_file_name(out)
     combinations = choose(sweep, methods)
     with open_experiment(read_dataset(dataset), combinations, out, sweep=sweep, seed=seed) as experiment:
         done = experiment.images - len(experiment.missing())

@@ -18,7 +18,7 @@ import numpy as np
 import tomli_w
 
 from tiltvp.errors import CalibrationError, InvalidInputError
-from tiltvp.files import whole_folder
+from tiltvp.files import refuse_file_name, whole_folder
 from tiltvp.images import write_image
 from tiltvp.lab.datasets.description import DESCRIPTION
 from tiltvp.lab.datasets.rows import ROWS, TiltImage
@@ -141,6 +141,7 @@ def _results(waiting: deque[Future[Result]]) -> Iterator[Result]:
 
 
 def _refuse_taken(target: Path, force: bool) -> None:
+    refuse_file_name(target)
     if not target.exists() and not target.is_symlink():
         return
     is_ours = target.is_dir() and ((target / DESCRIPTION).is_file() or not any(target.iterdir()))
