@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
-from tiltvp.lab.datasets.driving import drive_room
+from tiltvp.lab.datasets.driving import OPEN_KINDS, drive_room
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
 from tiltvp.lab.evaluation.extrinsics import judged_extrinsics
@@ -20,7 +20,6 @@ from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot_setup import TILT_OPTIONS, DriveTilts, drive_tilts, find_setup
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import Wheels, frame_motions, open_frames
-from tiltvp.synth import ROOM_KINDS
 from tiltvp.tilt import TiltEstimator, TiltFilter
 from tiltvp.turning import check_turns
 
@@ -35,8 +34,6 @@ CAMERAS: Final = {
 }
 CASES: Final = {"level": (0.0, 0.0), "1 degree": (1.0, 0.0), "1 degree, bumps": (1.0, 1.0)}
 """Floors by name: slope and greatest lean from bumps, degrees."""
-KINDS: Final = tuple(kind for kind in ROOM_KINDS if kind != "under-table")
-"""Under tables no image tells which way is up."""
 METHODS: Final[dict[str, dict[str, Any]]] = {"segments": TILT_OPTIONS, "refined": {"method": "refined"}}
 """Options of the estimator by the name of its method: those of `find_setup`, and beside it the pixels'."""
 _OFF_DEG: Final = 1.5
@@ -68,7 +65,7 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
     slope_deg, bumps_deg = CASES[floor]
     rng = np.random.default_rng((seed, number))
     roll, pitch = np.radians(rng.uniform(-_OFF_DEG, _OFF_DEG, 2))
-    kind = KINDS[number % len(KINDS)]
+    kind = OPEN_KINDS[number % len(OPEN_KINDS)]
     drive = RecordedDrive(
         drive_room(kind, seed + number), camera, robot_from_camera=nominal, mounting_rad=(roll, pitch),
         floor_slope_rad=(math.radians(slope_deg), rng.uniform(-math.pi, math.pi)),
