@@ -164,3 +164,12 @@ def test_it_is_said_where_edges_speak_against_the_calibration(run: Run, places: 
     assert (said.code, said.err.count("\n")) == (0, 1)
     assert said.err.startswith("tiltvp: --camera: ")
     assert "straight edges are bent, as by another lens: its centre" in said.err
+
+
+@pytest.mark.parametrize("verb", AT_ONCE)
+def test_images_whose_pixels_are_broken_are_told_too(run: Run, folder: Path, verb: str) -> None:
+    for name in ("3.png", "6.png"):
+        file = folder / "images" / name
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    said = run(*verb.split(), "images", "--camera", "camera.toml").err
+    assert said.count("tiltvp: 2 images cannot be used, first images/3.png: not an image that can be decoded") == 1

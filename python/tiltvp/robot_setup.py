@@ -61,6 +61,8 @@ class DriveTilts:
     estimates: list[TiltEstimate | None]
     motions: list[Motion | None]
     """None where the odometry does not tell."""
+    problems: dict[str, TiltvpError]
+    """What is wrong with those images that could not be used, by their names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,8 @@ class RobotSetup:
     """Whether images turn as the odometry says; None without odometry."""
     mounting: MountingTilt
     """Roll and pitch of the mounting."""
+    problems: dict[str, TiltvpError]
+    """What is wrong with images that were measured and could not be used, by their names."""
 
     @property
     def sure_of_direction(self) -> bool:
@@ -180,7 +184,7 @@ def find_setup(
         wheels=wheels,
         topics=topics,
     )
-    return RobotSetup(robot, rotation, direction, rim, body, turns, mounting)
+    return RobotSetup(robot, rotation, direction, rim, body, turns, mounting, tilts.problems)
 
 
 def _turn_axis(
@@ -224,18 +228,18 @@ def drive_tilts(
     count = _count_of(frames, motions)
     numbers = [int(number) for number in np.linspace(0, count - 1, measured_count(frames))]
     estimates: list[TiltEstimate | None] = []
-    usable = 0
+    problems = dict[str, TiltvpError]()
     for number, frame in zip(numbers, frames.sample(numbers), strict=False):
-        told = motions is None or motions[number] is not None
-        image = _usable(frame, estimator.camera) if told else None
-        usable += image is not None or not told
-        estimate = None if image is None else estimator(image)
+        image = _image_of(frame, estimator.camera) if motions is None or motions[number] is not None else None
+        if isinstance(image, TiltvpError):
+            problems[frame.name] = image
+        estimate = None if image is None or isinstance(image, TiltvpError) else estimator(image)
         estimates.append(estimate if estimate else None)
         advance()
-    if not usable:
+    if len(problems) == len(numbers):
         problem = _first_problem(frames, estimator.camera)
         raise InvalidInputError(f"{frames.source}: none of {counted(len(numbers), 'images')} can be used{problem}")
-    return DriveTilts(estimates, _joined(motions, numbers))
+    return DriveTilts(estimates, _joined(motions, numbers), problems)
 
 
 def _count_of(frames: Frames, motions: Sequence[Motion | None] | None) -> int:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tiltvp.cli.terminal import complain
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.cli.terminal import complain, named
+from tiltvp.errors import InvalidInputError, TiltvpError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Mounted = TiltEstimator | LineExtractor
 
-__all__ = ["check_panoramas", "check_sizes", "tell_setup", "tell_setup_of"]
+__all__ = ["check_panoramas", "check_sizes", "tell_setup", "tell_setup_of", "tell_unusable"]
 
 
 def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
@@ -55,6 +55,13 @@ def check_panoramas(frames: Frames) -> None:
         if size is not None and all(each is not None and each[0] != 2 * each[1] for _, each in sizes):
             found = f"{name}: {size[0]} x {size[1]} pixels, and no --camera"
             raise InvalidInputError(f"{found}, expected one, or 360-degree panoramas, twice as wide as high")
+
+
+def tell_unusable(frames: Frames, problems: Mapping[str, TiltvpError]) -> None:
+    """A line on stderr for images that were decoded and could not be used, unless it was told of before."""
+    new = [named(name, str(problem)) for name, problem in problems.items() if name not in frames.told]
+    if new:
+        complain(f"{counted(len(new), 'images')} cannot be used, first {new[0]}" if len(new) > 1 else new[0])
 
 
 def tell_setup(images: Sequence[NDArray[Any]], estimator: Mounted, mask: NDArray[Any] | None) -> None:

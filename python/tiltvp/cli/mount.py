@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tiltvp.cli.frame_checks import tell_setup_of
+from tiltvp.cli.frame_checks import tell_setup_of, tell_unusable
 from tiltvp.cli.options import ABOVE_0, CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import KeptOptions, MotionOptions, check_apart
@@ -67,6 +67,7 @@ def mount(
     tell_setup_of(frames, estimator)
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
+    tell_unusable(frames, tilts.problems)
     found = mounting_tilt(
         tilts.estimates, tilts.motions, estimator.robot_from_camera,
         level_floor=level_floor, half_track_m=motion.of_robot(robot, frames).wheels().half_track_m,

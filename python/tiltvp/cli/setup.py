@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tiltvp.cli.frame_checks import tell_unusable
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.sources import KeptOptions, MotionOptions, check_apart
@@ -86,6 +87,7 @@ def setup(
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
             advance=bar.advance,
         )
+    tell_unusable(frames, found.problems)
     if known is not None and robot_from_camera is not None:
         known = replace(known, covariance=None, covariance_rad2=None)
     robot = found.robot if known is None else found.again(known)
