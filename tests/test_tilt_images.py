@@ -53,8 +53,8 @@ def test_every_usual_kind_of_image_has_the_same_answer(camera: tiltvp.Camera, ro
         (np.full((256, 256), 255.0), "255"),
         (np.zeros((256, 256), object), "object"),
         (np.zeros((256, 256), "U1"), "U1"),
-        (None, "object"),
-        ("image.png", "shape ()"),
+        (None, "NoneType"),
+        ("image.png", "str"),
     ],
 )
 def test_wrong_images_are_refused(camera: tiltvp.Camera, image: Any, words: str) -> None:

@@ -86,6 +86,8 @@ def pixels_from(image: ArrayLike, name: str, expected: str) -> NDArray[Any]:
         array = np.asarray(image)
     except ValueError as error:
         raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {expected}") from error
+    if array.ndim == 0:
+        raise InvalidInputError(f"{name}: {type(image).__name__}, expected {expected}")
     return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 

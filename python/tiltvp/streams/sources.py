@@ -45,7 +45,7 @@ def open_frames(
         bags = sorted(str(file) for folder in folders for file in folder.iterdir() if is_recording(file))
         if bags:
             raise InvalidInputError(f"{frames.source}: a folder of recordings, expected one of them: {', '.join(bags)}")
-        told = "; ".join(frames.problems) or f"{frames.source}: no frames"
+        told = "; ".join(frames.problems) or (f"{frames.source}: no frames" if frames.source else "no names of files")
         kinds = f"images ({' '.join(IMAGE_ENDINGS)}), a video or a bag"
         raise InvalidInputError(told if frames.problems else f"{told}, expected {kinds}")
     return frames
