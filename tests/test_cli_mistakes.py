@@ -47,6 +47,9 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
          "--start: a yaw of 90 radians, expected at most 2 pi; 90 degrees are 1.571"),
         ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --start-sigma 0.3 0.3 30",
          "--start-sigma: a yaw of 30 radians, expected at most 2 pi; 30 degrees are 0.5236"),
+        ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --read-as degree",
+         "--read-as 'degree' (did you mean degrees?), expected one of wheels-swapped, wheels-negated, "
+         "left-wheel-negated, right-wheel-negated, clockwise, degrees, millimetres, cumulative"),
         ("dataset drive --out d --legs 2.3", "--legs '2.3', expected METRES,DEGREES"),
         ("demo --alpha-deg 400", 'Invalid value "400.0" for --alpha-deg. Must be <= 180. Try `tiltvp demo --help`.'),
         ("demo --page p.html --out d", "--out d beside --page p.html, expected one of them"),

@@ -10,7 +10,7 @@ from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, source
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
-from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.options import CameraOptions, check_word
 from tiltvp.cli.rerun_views import send_calibration
 from tiltvp.cli.showing import RERUN, RerunOptions
 from tiltvp.cli.sources import MotionOptions, check_apart
@@ -57,8 +57,11 @@ def calibrate(
         The filter: default, or paper.
     """
     from tiltvp import SelfCalibrator
+    from tiltvp.drive_logs import READINGS
 
     watching.check()
+    for word in read.read_as:
+        check_word("--read-as", word, tuple(READINGS))
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
     if camera is not None and robot is None and motion.wheel_base is None:
         camera.load(pictures.topic)  # Says what is wrong with a file that would tell the wheel base.
