@@ -130,6 +130,7 @@ impl CornerCompletion<'_> {
         gray_search(self.options, normal, vertex, [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad])
     }
 
+    /// The edge where it is looked for, if it begins there, as far as every so many pixels tell.
     fn follow(
         &self,
         search: &RaySearch,

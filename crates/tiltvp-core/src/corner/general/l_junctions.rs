@@ -17,8 +17,7 @@ impl CornerCompletion<'_> {
     pub(crate) fn l_junctions(&self, scratch: &mut GeneralScratch, out: &mut Vec<CornerFeature>) {
         let GeneralScratch { segments, trace: memory, .. } = scratch;
         for crossing in &self.crossings(&segments.list) {
-            let Some((_, jacobian)) = self.camera.project_jacobian(&crossing.place) else { continue };
-            let px_per_rad = jacobian.norm() / 2f64.sqrt();
+            let Some(px_per_rad) = self.camera.px_per_rad(&crossing.place) else { continue };
             let Some(seen) = self.own_edges(crossing, px_per_rad, &segments.list, memory) else { continue };
             let mut rays = seen.map(|traced| traced.map(|traced| traced.ray));
             rays[crossing.third()] = self.unseen(crossing.third(), &crossing.place);
