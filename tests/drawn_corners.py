@@ -66,6 +66,20 @@ def photographed(picture: np.ndarray, noise: float, seed: int = 5) -> np.ndarray
     return np.clip(np.rint(255.0 * light ** (1 / 2.2) + grain), 0, 255).astype(np.uint8)
 
 
+def amid_lines(picture: np.ndarray, centre: np.ndarray, reach: float) -> np.ndarray:
+    """A picture of 1920 x 1440 with 120 lines of any direction away from its `centre`, as the camera sees it."""
+    rng = np.random.default_rng(2)
+    for _ in range(120):
+        while True:
+            middle, angle = rng.uniform([0, 0], [1920, 1440]), rng.uniform(0, np.pi)
+            half = 150 * np.array([np.cos(angle), np.sin(angle)])
+            if min(np.hypot(*(point - centre)) for point in (middle - half, middle, middle + half)) > reach:
+                break
+        ends = [tuple((middle + sign * half).astype(int).tolist()) for sign in (-1, 1)]
+        cv2.line(picture, ends[0], ends[1], (int(rng.integers(0, 90)),), 8)
+    return photographed(np.repeat(picture[..., None], 3, 2), 1.0, 2)
+
+
 def off_px(found: np.ndarray, true: np.ndarray) -> np.ndarray:
     return 400.0 * (found / found[2] - true / true[2])[:2]
 

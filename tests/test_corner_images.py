@@ -19,11 +19,11 @@ from drawn_corners import (
     GREYS,
     LEFT_FROM_RIGHT,
     LIT_FROM_ABOVE,
+    amid_lines,
     drawn,
     off_deg,
     off_px,
     pair,
-    photographed,
     pose,
     turn,
 )
@@ -367,23 +367,20 @@ def test_a_cuboid_that_misfits_the_calibration_is_none() -> None:
 
 def test_three_lines_of_one_image_are_no_corner_amid_edges_that_run_otherwise() -> None:
     """Any three lines that meet are a corner with right angles to one camera."""
-    rng = np.random.default_rng(2)
     picture, centre = np.full((1440, 1920), 150, np.uint8), np.array([960, 720])
     tips = [centre + 480 * np.array([np.cos(t), np.sin(t)]) for t in (np.pi / 2 + 0.05, np.pi + 0.5, -0.45)]
     for side, grey in enumerate((60, 110, 200)):
         cv2.fillPoly(picture, [np.array([centre, tips[side], tips[(side + 1) % 3]]).astype(np.int32)], (grey,))
-    for _ in range(120):
-        while True:
-            middle, angle = rng.uniform([0, 0], [1920, 1440]), rng.uniform(0, np.pi)
-            half = 150 * np.array([np.cos(angle), np.sin(angle)])
-            if min(np.hypot(*(point - centre)) for point in (middle - half, middle, middle + half)) > 560:
-                break
-        ends = [tuple((middle + sign * half).astype(int).tolist()) for sign in (-1, 1)]
-        cv2.line(picture, ends[0], ends[1], (int(rng.integers(0, 90)),), 8)
-    image = photographed(np.repeat(picture[..., None], 3, 2), 1.0, 2)
-    estimate = CornerPoseEstimator(CAMERA, method="general", down=(0.0, 1.0, 0.0))(image)
+    estimate = CornerPoseEstimator(CAMERA, method="general", down=(0.0, 1.0, 0.0))(amid_lines(picture, centre, 560))
     assert estimate.features_left
     assert not estimate.hypotheses
+    # Nor are two that agree, as here where the left and the right face have one level; four of a cuboid are.
+    rotation, vertex = pose()
+    for faces, is_told in ((GREYS, True), (GREYS | {"right": GREYS["left"]}, False)):
+        cuboid = cv2.resize(drawn(rotation, vertex, faces, noise=0.0)[..., 1], (1920, 1440))
+        estimator = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1])
+        assert len(estimator(amid_lines(cuboid, centre, 620)).chosen_left) == (4 if is_told else 0)
+        assert len(estimator.left(amid_lines(cuboid, centre, 620), rotation[:, 1])) > 1
 
 
 def test_a_frame_that_is_refused_leaves_all_as_it_was() -> None:
