@@ -167,7 +167,8 @@ impl CornerPoseEstimator {
         Ok(estimate)
     }
 
-    /// What a frame shows by edges whose gradients are a `share` of what the options ask for, and the pairs of features that are corners.
+    /// What a frame shows by edges whose gradients are a `share` of what the options ask for, the pairs of features that are corners, and
+    /// the attitude that most edges have in common.
     fn look(
         &mut self,
         left: &Frame<'_>,
