@@ -17,11 +17,13 @@ _OF_PYTHON: Final = {
 
 def of_option(problem: str) -> str:
     """What is wrong with an option or argument of the library as it is typed; else as it is."""
-    from tiltvp.cli.declared_options import KEYWORDS, flag_of, is_angle
-
     head = r"(?:option (?:view\.)?|(?=field_of_view_rad\b)|(?=(\w+): got ))"
     found = re.match(head + r"(\w+)(?:, (\w+))?(?: = (\[[^]]*\]|[^ ,]+),)?(?=[ :])", problem)
-    if found is None or found[1] not in (None, *KEYWORDS):
+    if found is None:
+        return problem
+    from tiltvp.cli.declared_options import KEYWORDS, flag_of, is_angle
+
+    if found[1] not in (None, *KEYWORDS):
         return problem
     (_, keyword, second, value), rest = found.groups(), problem[found.end() :]
     told = "" if value is None else f" = {value},"
