@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 import pytest
 from dask.distributed import LocalCluster
+from distributed.client import FutureState
 
 from evaluations import evaluated, same_bytes
 from tiltvp.cli import main
@@ -101,6 +103,14 @@ def test_what_is_lost_in_the_middle(
     lost: str, told: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("tiltvp.lab.cluster._WORKERS_S", 0.5)
+    cancel = FutureState.cancel
+
+    def slowly(*given: Any, **named: Any) -> None:
+        """Dask cancels in its own thread what is lost, while this one takes results that are there and submits more."""
+        time.sleep(1e-3)
+        cancel(*given, **named)
+
+    monkeypatch.setattr(FutureState, "cancel", slowly)
     pipe, null = subprocess.PIPE, subprocess.DEVNULL
     with subprocess.Popen(
         [sys.executable, "-c", SCHEDULER], stdin=pipe, stdout=pipe, stderr=null, text=True
@@ -110,6 +120,7 @@ def test_what_is_lost_in_the_middle(
         made = results_of(process.stdout.readline().strip(), max, 1, ((number, 2) for number in count()))
         try:
             assert next(made)[1] == 2
+            time.sleep(1.0)  # Hundreds of results are there.
             if lost == "scheduler":
                 process.kill()
             else:

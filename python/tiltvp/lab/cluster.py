@@ -42,19 +42,23 @@ def results_of(
     """
     distributed = _dask()
     client = _client(distributed, address)
-    left, numbers = iter(chunks), {}
+    left, numbers = iter(chunks), dict[str, int]()
     try:
         done = distributed.as_completed([], loop=client.loop, with_results=True)
 
+        async def submitted(chunks: Iterable[Given]) -> list[Any]:
+            """In Dask's own thread, where alone its tasks do not change while it goes through them."""
+            return [client.submit(task, job, chunk, pure=False) for chunk in chunks]
+
         def submit(count: int) -> None:
-            for number, chunk in islice(left, count):
-                future = client.submit(task, job, chunk, pure=False)
-                numbers[future.key] = number
-                done.add(future)
+            taken = dict(islice(left, count))
+            futures = client.sync(submitted, taken.values())
+            numbers.update((future.key, number) for future, number in zip(futures, taken, strict=True))
+            done.update(futures)
 
         submit(_WAITING)
         try:
-            for future, made in _as_they_come(done, client, address):
+            for future, made in _as_they_come(distributed, done, client, address):
                 if future.cancelled():  # What Dask made of it is then an error, or nothing.
                     raise distributed.CancelledError("its tasks are cancelled")
                 yield numbers.pop(future.key), made
@@ -67,11 +71,13 @@ def results_of(
         _close(client)
 
 
-def _as_they_come(done: Any, client: Any, address: str) -> Iterator[tuple[Any, Any]]:
+def _as_they_come(distributed: Any, done: Any, client: Any, address: str) -> Iterator[tuple[Any, Any]]:
     """What `done` has; Dask itself waits for ever where no worker is left."""
     while not done.is_empty():
         seen_s = asked_s = time.monotonic()
         while not done.has_ready():
+            if client.status != "running":  # A task that is given now Dask loses without a word.
+                raise distributed.CancelledError("its connection is lost")
             time.sleep(_POLL_S)
             if time.monotonic() > asked_s + 1.0:
                 asked_s = time.monotonic()
