@@ -2389,6 +2389,9 @@ class Room:
             What all walls have in common; drawn, each on its own, if nothing. Default: "drawn".
         """
 
+    def _corners(self) -> list[tuple[list[float], list[list[float]], list[float], str]]:
+        """Position, directions of the edges x, y, z in rows, their lengths, and the kind, of each corner."""
+
     def _render(
         self, camera: Camera, *, threads: SupportsIndex | None, **options: Any
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

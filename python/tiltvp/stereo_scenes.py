@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -86,6 +87,16 @@ class SceneCorner:
         return np.column_stack([x, y, np.cross(x, y)])
 
 
+def scene_corners(
+    parts: Iterable[tuple[list[float], list[list[float]], list[float], str]],
+) -> tuple[SceneCorner, ...]:
+    """Corners of what the core tells of them."""
+    return tuple(
+        SceneCorner(np.array(position), np.array(edges), np.array(lengths), kind)
+        for position, edges, lengths, kind in parts
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class StereoTruth:
     """The M corners whose vertex is in sight in both images of a frame, in the order of their numbers."""
@@ -132,10 +143,7 @@ class StereoSequence(_core.StereoSequence):
     @cached_property
     def corners(self) -> tuple[SceneCorner, ...]:
         """The corners of the scene, visible or not; `corner` is the number of the one that is looked at."""
-        return tuple(
-            SceneCorner(np.array(position), np.array(edges), np.array(lengths), kind)
-            for position, edges, lengths, kind in self._corners()
-        )
+        return scene_corners(self._corners())
 
     def render(self, frame: int, *, threads: int | None = None) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """The left and the right image of a frame, (H, W, 3) in BGR order as everywhere, on so many threads."""

@@ -13,13 +13,22 @@ from tiltvp._core import SimulatedDrive, drive_legs, simulate_drive
 from tiltvp.arguments import number_from
 from tiltvp.cameras import Camera
 from tiltvp.images import checked_camera
-from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
+from tiltvp.stereo_scenes import (
+    ImuLog,
+    Laboratory,
+    SceneCorner,
+    StereoSequence,
+    StereoTruth,
+    scene_corners,
+    zed_cameras,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "MIRROR_BLIND_RAD",
+    "OUTDOOR_KINDS",
     "ROOM_KINDS",
     "WALL_PATTERNS",
     "Drive",
@@ -39,7 +48,10 @@ __all__ = [
     "zed_cameras",
 ]
 
-ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)
+OUTDOOR_KINDS: tuple[str, ...] = ("yard",)
+"""Places under the open sky: a yard between the fronts of houses and garden walls."""
+ROOM_KINDS: tuple[str, ...] = tuple(kind for kind in _core.ROOM_KINDS if kind not in OUTDOOR_KINDS)
+"""Rooms, with a ceiling."""
 WALL_PATTERNS: tuple[str, ...] = tuple(_core.WALL_PATTERNS)
 
 MIRROR_BLIND_RAD: float = math.radians(40.0)
@@ -75,7 +87,9 @@ class RoomImage:
 
 
 class Room(_core.Room):
-    """A furnished, lit room of one of `ROOM_KINDS`, built once: `Room(kind, seed)`. The same arguments, the same room.
+    """A furnished, lit room of one of `ROOM_KINDS`, or a place of `OUTDOOR_KINDS`, built once: `Room(kind, seed)`.
+
+    The same arguments, the same room.
 
     The world frame has z up and the floor at z = 0; metres. `threads` is how many build it, None for one per core; the
     room does not depend on it. None stands for what is usual: `clutter` and `daylight` from 0 to 1 are how full it is
@@ -87,6 +101,11 @@ class Room(_core.Room):
     """
 
     __slots__ = ()
+
+    @property
+    def corners(self) -> tuple[SceneCorner, ...]:
+        """Where an upright and two level edges of walls and things meet, visible or not."""
+        return scene_corners(self._corners())
 
     def render(
         self,
@@ -249,7 +268,7 @@ def render_room(
     noise_sigma: float = 2.0,
     samples: int | None = None,
 ) -> RoomImage:
-    """Renders one of `ROOM_KINDS` from a free place in it. The same arguments give the same bytes.
+    """Renders a `Room` of a kind from a free place in it. The same arguments give the same bytes.
 
     `noise_sigma` is in grey levels, `samples` the rays per pixel and side (None: 3). For many views of one room, build
     a `Room`. Raises `tiltvp.errors.InvalidInputError`.

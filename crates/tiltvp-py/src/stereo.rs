@@ -21,7 +21,7 @@ use crate::synth::{Room, call_on_threads, frame_from};
 use crate::value::{frozen, getters, of_class};
 
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
-type CornerParts = ([f64; 3], [[f64; 3]; 3], [f64; 3], &'static str);
+pub(crate) type CornerParts = ([f64; 3], [[f64; 3]; 3], [f64; 3], &'static str);
 type Sightings<'py> = (Array<'py, i64>, Array<'py, f64>, Array<'py, f64>);
 type Readings<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, f64>, Array<'py, f64>);
 type Picture<'py> = Array<'py, u8>;
@@ -118,11 +118,7 @@ impl StereoSequence {
 
     /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of each corner of the scene.
     fn _corners(&self, py: Python<'_>) -> PyResult<Vec<CornerParts>> {
-        let world = world_of(self.scene.bind(py))?;
-        let parts = |corner: &tiltvp_synth::Corner| {
-            (corner.position.into(), corner.edges.map(Into::into), corner.lengths_m, corner.kind.name())
-        };
-        Ok(world.corners().iter().map(parts).collect())
+        Ok(corner_parts(&*world_of(self.scene.bind(py))?))
     }
 
     /// The left and the right image of a frame, (H, W, 3).
@@ -229,6 +225,13 @@ impl StereoSequence {
             (room, of_class::<Laboratory>(scene).map(|laboratory| laboratory.options.clone()))
         })
     }
+}
+
+pub(crate) fn corner_parts(world: &World) -> Vec<CornerParts> {
+    let parts = |corner: &tiltvp_synth::Corner| {
+        (corner.position.into(), corner.edges.map(Into::into), corner.lengths_m, corner.kind.name())
+    };
+    world.corners().iter().map(parts).collect()
 }
 
 fn world_of(scene: &Bound<'_, PyAny>) -> PyResult<Arc<World>> {

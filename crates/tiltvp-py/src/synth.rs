@@ -16,6 +16,7 @@ use crate::call::{call_long, invalid};
 use crate::convert::{self, Number, Word};
 use crate::options;
 use crate::reader;
+use crate::stereo::{CornerParts, corner_parts};
 use crate::value::{frozen, getters};
 
 pub(crate) type Pictures<'py> = (Array<'py, u8>, Array<'py, u8>);
@@ -146,6 +147,11 @@ impl Room {
         let ends: Vec<_> = edges.iter().map(|edge| Matrix3x2::from_columns(&edge.ends).transpose()).collect();
         let contrasts = edges.iter().map(|edge| edge.contrast).collect();
         Ok((convert::to_matrices(py, &ends, false)?, Array::new(PyArray1::from_vec(py, contrasts))))
+    }
+
+    /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of each corner.
+    fn _corners(&self) -> Vec<CornerParts> {
+        corner_parts(&self.world)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

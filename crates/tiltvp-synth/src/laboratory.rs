@@ -10,7 +10,7 @@ use crate::corner::{Corner, CornerKind, of_box};
 use crate::frame::Frame;
 use crate::options::{RoomKind, WallPattern};
 use crate::outdoors::Outdoors;
-use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::plan::{Filling, Opening, Plan, Wall, rectangle};
 use crate::rng::Rng;
 use crate::{furniture, shell};
 
@@ -92,17 +92,11 @@ pub(crate) fn build(options: &LaboratoryOptions, builder: &mut Builder) -> Plan 
 /// Four walls with two doors, and the lamps of the ceiling alone.
 fn plan(seed: u32) -> Plan {
     let [width, depth, height] = ROOM_M;
-    let outline =
-        vec![Vector2::new(0.0, 0.0), Vector2::new(width, 0.0), Vector2::new(width, depth), Vector2::new(0.0, depth)];
-    let walls = (0..4)
-        .map(|k| {
-            let (from, to) = (outline[k], outline[(k + 1) % 4]);
-            let length = (to - from).norm();
-            let frame = Frame { origin: Vector3::new(from.x, from.y, 0.0), x: (to - from) / length };
-            let door = Opening { filling: Filling::Door, along: [1.1, 2.0], z: [0.0, 2.05] };
-            Wall { frame, length, openings: if k % 2 == 1 { vec![door] } else { Vec::new() } }
-        })
-        .collect();
+    let outline = rectangle(width, depth);
+    let mut walls = Wall::around(&outline);
+    for wall in walls.iter_mut().skip(1).step_by(2) {
+        wall.openings.push(Opening { filling: Filling::Door, along: [1.1, 2.0], z: [0.0, 2.05] });
+    }
     Plan {
         kind: RoomKind::Office,
         outline,

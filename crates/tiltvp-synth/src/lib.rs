@@ -45,6 +45,7 @@ mod tone;
 mod trajectory;
 mod view;
 mod world;
+mod yard;
 
 pub use bearing_drive::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 pub use corner::{Corner, CornerKind};

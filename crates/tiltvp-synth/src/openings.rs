@@ -75,8 +75,24 @@ pub(crate) fn door(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &T
     builder.cuboid(frame, [x0 - 0.24, 0.0, 1.05], [x0 - 0.16, 0.012, 1.13], trims.radiator);
 }
 
-/// A window with its frame and bars, and a radiator and curtains if there are.
+/// A window with its frame and bars, its sill, and a radiator and curtains if there are.
 pub(crate) fn window(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
+    casement(frame, opening, wall, trims, builder);
+    let ([x0, x1], [z0, z1]) = (opening.along, opening.z);
+    if z0 > 0.5 {
+        builder.cuboid(frame, [x0 - 0.06, -0.1, z0 - 0.03], [x1 + 0.06, 0.1, z0], trims.trim);
+        radiator(&frame.then(0.5 * (x0 + x1), 0.03, 0.0, 0.0), 0.8 * (x1 - x0), z0 - 0.15, trims, builder);
+    }
+    if let Some(curtain) = trims.curtain {
+        builder.cuboid(frame, [x0 - 0.35, 0.06, z1 + 0.1], [x1 + 0.35, 0.085, z1 + 0.125], trims.metal);
+        for (from, to) in [(x0 - 0.3, x0 + 0.12), (x1 - 0.12, x1 + 0.3)] {
+            drape(frame, [from, to], [0.03, z1 + 0.11], curtain, builder);
+        }
+    }
+}
+
+/// The pane of a window with its reveal, frame and bars.
+pub(crate) fn casement(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
     let ([x0, x1], [z0, z1]) = (opening.along, opening.z);
     reveal(frame, opening, 0.2, wall, trims.trim, builder);
     builder.pane(frame, [[x1, -0.16, z0], [x0, -0.16, z0], [x1, -0.16, z1]], [0.0; 2], trims.glass);
@@ -95,16 +111,6 @@ pub(crate) fn window(frame: &Frame, opening: &Opening, wall: MaterialId, trims: 
     for k in 1..=levels {
         let z = z0 + (z1 - z0) * k as f64 / (levels + 1) as f64;
         bar([x0 + 0.06, z - 0.018], [x1 - 0.06, z + 0.018]);
-    }
-    if z0 > 0.5 {
-        builder.cuboid(frame, [x0 - 0.06, -0.1, z0 - 0.03], [x1 + 0.06, 0.1, z0], trims.trim);
-        radiator(&frame.then(0.5 * (x0 + x1), 0.03, 0.0, 0.0), 0.8 * (x1 - x0), z0 - 0.15, trims, builder);
-    }
-    if let Some(curtain) = trims.curtain {
-        builder.cuboid(frame, [x0 - 0.35, 0.06, z1 + 0.1], [x1 + 0.35, 0.085, z1 + 0.125], trims.metal);
-        for (from, to) in [(x0 - 0.3, x0 + 0.12), (x1 - 0.12, x1 + 0.3)] {
-            drape(frame, [from, to], [0.03, z1 + 0.11], curtain, builder);
-        }
     }
 }
 

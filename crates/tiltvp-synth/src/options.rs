@@ -21,6 +21,8 @@ words! {
         Narrow = "narrow",
         /// A dining room whose robot places are under the table, among the legs of table and chairs.
         UnderTable = "under-table",
+        /// Outdoors: a yard between the fronts of houses and garden walls.
+        Yard = "yard",
     }
 }
 

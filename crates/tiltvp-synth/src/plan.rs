@@ -7,6 +7,9 @@ use crate::options::{RoomKind, RoomOptions, WallPattern};
 use crate::outdoors::Outdoors;
 use crate::rng::Rng;
 
+/// Height of a yard's sky, metres: above the ridges of three storeys.
+const SKY_M: f64 = 18.0;
+
 /// What fills a hole in a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Filling {
@@ -31,6 +34,18 @@ pub(crate) struct Wall {
 }
 
 impl Wall {
+    /// The walls around an outline, without openings.
+    pub(crate) fn around(outline: &[Vector2<f64>]) -> Vec<Self> {
+        (0..outline.len())
+            .map(|k| {
+                let (from, to) = (outline[k], outline[(k + 1) % outline.len()]);
+                let length = (to - from).norm();
+                let frame = Frame { origin: Vector3::new(from.x, from.y, 0.0), x: (to - from) / length };
+                Self { frame, length, openings: Vec::new() }
+            })
+            .collect()
+    }
+
     /// Whether an interval of the wall, widened by `margin`, is free of the given filling.
     pub(crate) fn is_free_of(&self, filling: Filling, from: f64, to: f64, margin: f64) -> bool {
         self.openings.iter().all(|o| o.filling != filling || to < o.along[0] - margin || from > o.along[1] + margin)
@@ -66,12 +81,17 @@ impl Plan {
             RoomKind::LShaped => (rng.within(6.0, 8.0), rng.within(5.0, 6.5)),
             RoomKind::Narrow => (rng.within(3.5, 6.0), rng.within(1.9, 2.3)),
             RoomKind::UnderTable => (rng.within(4.2, 5.5), rng.within(3.7, 4.6)),
+            RoomKind::Yard => (rng.within(9.0, 15.0), rng.within(8.0, 12.0)),
         };
         let (width, depth) =
             (width * options.extent, depth * if kind == RoomKind::Corridor { 1.0 } else { options.extent });
-        let height = rng.within(2.45, if kind == RoomKind::Narrow { 2.7 } else { 3.0 });
-        let corner = Vector2::new;
+        let height = match kind {
+            RoomKind::Narrow => rng.within(2.45, 2.7),
+            RoomKind::Yard => SKY_M,
+            _ => rng.within(2.45, 3.0),
+        };
         let (outline, floors) = if kind == RoomKind::LShaped {
+            let corner = Vector2::new;
             let (a, b) = (width * rng.within(0.4, 0.6), depth * rng.within(0.4, 0.55));
             (
                 vec![
@@ -85,19 +105,9 @@ impl Plan {
                 vec![[0.0, 0.0, width, depth - b], [0.0, depth - b, width - a, depth]],
             )
         } else {
-            (
-                vec![corner(0.0, 0.0), corner(width, 0.0), corner(width, depth), corner(0.0, depth)],
-                vec![[0.0, 0.0, width, depth]],
-            )
+            (rectangle(width, depth), vec![[0.0, 0.0, width, depth]])
         };
-        let mut walls: Vec<Wall> = (0..outline.len())
-            .map(|k| {
-                let (from, to) = (outline[k], outline[(k + 1) % outline.len()]);
-                let length = (to - from).norm();
-                let frame = Frame { origin: Vector3::new(from.x, from.y, 0.0), x: (to - from) / length };
-                Wall { frame, length, openings: Vec::new() }
-            })
-            .collect();
+        let mut walls = Wall::around(&outline);
         pierce(kind, height, &mut walls, rng);
         let outdoors = day(options, &walls, rng);
         let lamps = if options.daylight < 0.3 || rng.chance(0.6) { rng.within(9.0, 16.0) } else { 1.5 };
@@ -129,6 +139,11 @@ impl Plan {
     }
 }
 
+/// The corners of a rectangle, counter-clockwise from the origin.
+pub(crate) fn rectangle(width: f64, depth: f64) -> Vec<Vector2<f64>> {
+    [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]].map(Vector2::from).to_vec()
+}
+
 /// How many doors and windows each wall gets, by kind of room.
 fn counts(kind: RoomKind, walls: &[Wall], rng: &mut Rng) -> Vec<[usize; 2]> {
     let along = |k: usize, width: f64| ((walls[k].length / width) as usize).max(1);
@@ -142,6 +157,8 @@ fn counts(kind: RoomKind, walls: &[Wall], rng: &mut Rng) -> Vec<[usize; 2]> {
         RoomKind::LivingRoom | RoomKind::UnderTable => {
             vec![[0, along(0, 2.6)], [0, 1], [1, 0], [rng.below(2), 0]]
         }
+        // Houses have theirs, on each storey.
+        RoomKind::Yard => Vec::new(),
     }
 }
 

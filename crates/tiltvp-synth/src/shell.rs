@@ -6,10 +6,13 @@ use crate::builder::{Builder, Column, Material, MaterialId, Patch};
 use crate::frame::Frame;
 use crate::openings::{Trims, curtain, door, door_leaf, window};
 use crate::options::{RoomKind, WallPattern};
-use crate::plan::{Filling, Plan, Wall};
+use crate::plan::{Filling, Opening, Plan, Wall};
 use crate::rng::Rng;
 use crate::segment::Segment;
 use crate::texture::{Motif, Texture, rgb, scale};
+
+/// Thickness and height of the boards at the foot of a room's walls, metres.
+const SKIRTING_M: [f64; 2] = [0.015, 0.09];
 
 /// Builds the shell of a plan.
 pub(crate) fn build(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
@@ -38,13 +41,13 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
     };
     for (k, wall) in plan.walls.iter().enumerate() {
         let own = if k == chosen { accent } else { plain };
-        panels(wall, plan.height, own, builder);
+        panels(wall, &wall.openings, [0.0, plan.height], own, builder);
         builder.edge(wall.frame.origin, plan.height);
         paint_edges(wall, plan.height, &textures[usize::from(k == chosen)], builder);
         if plan.wall_pattern == WallPattern::Panels {
             battens(wall, plan.height, trims.trim, builder);
         }
-        skirting(wall, trims.trim, builder);
+        skirting(wall, SKIRTING_M, trims.trim, builder);
         for opening in &wall.openings {
             match opening.filling {
                 Filling::Door => door(&wall.frame, opening, own, &trims, builder),
@@ -69,9 +72,9 @@ pub(crate) fn build_plain(plan: &Plan, builder: &mut Builder) {
         bars: [1, 1],
     };
     for own in &plan.walls {
-        panels(own, plan.height, wall, builder);
+        panels(own, &own.openings, [0.0, plan.height], wall, builder);
         builder.edge(own.frame.origin, plan.height);
-        skirting(own, trims.trim, builder);
+        skirting(own, SKIRTING_M, trims.trim, builder);
         for opening in &own.openings {
             door(&own.frame, opening, wall, &trims, builder);
         }
@@ -150,7 +153,7 @@ fn floor(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
 }
 
 /// Lays a floor of one texture.
-fn lay(texture: Texture, plan: &Plan, builder: &mut Builder) {
+pub(crate) fn lay(texture: Texture, plan: &Plan, builder: &mut Builder) {
     let material = builder.material(if plan.floor_gloss > 0.0 {
         Material::Polished(texture, plan.floor_gloss)
     } else {
@@ -271,37 +274,44 @@ fn wall_texture(kind: RoomKind, accent: bool, tone: f64, rng: &mut Rng) -> Textu
     ])
 }
 
-/// The wall itself, around its openings, and their reveals' edges.
-fn panels(wall: &Wall, height: f64, material: MaterialId, builder: &mut Builder) {
+/// The wall itself between two heights, around its openings there, which are not above each other.
+pub(crate) fn panels(
+    wall: &Wall,
+    openings: &[Opening],
+    [bottom, top]: [f64; 2],
+    material: MaterialId,
+    builder: &mut Builder,
+) {
     let mut cuts = vec![0.0, wall.length];
-    for opening in &wall.openings {
+    for opening in openings {
         cuts.extend(opening.along);
     }
     cuts.sort_by(f64::total_cmp);
     let mut rectangles = Vec::new();
     for pair in cuts.windows(2) {
         let (from, to) = (pair[0], pair[1]);
-        let hole = wall.openings.iter().find(|o| o.along[0] < 0.5 * (from + to) && o.along[1] > 0.5 * (from + to));
-        let parts = hole.map_or([[0.0, height], [0.0, 0.0]], |o| [[0.0, o.z[0]], [o.z[1], height]]);
+        let hole = openings.iter().find(|o| o.along[0] < 0.5 * (from + to) && o.along[1] > 0.5 * (from + to));
+        let parts = hole.map_or([[bottom, top], [bottom, bottom]], |o| [[bottom, o.z[0]], [o.z[1], top]]);
         for [low, high] in parts {
             if high - low > 1e-6 && to - from > 1e-6 {
                 // Seen from the front, the wall's x runs to the left.
-                rectangles.push([[wall.length - to, low], [wall.length - from, high]]);
+                rectangles.push([[wall.length - to, low - bottom], [wall.length - from, high - bottom]]);
             }
         }
     }
     let patch = Patch {
-        origin: wall.frame.point(wall.length, 0.0, 0.0),
+        origin: wall.frame.point(wall.length, 0.0, bottom),
         du: wall.frame.vector(-wall.length, 0.0, 0.0),
-        dv: Vector3::z() * height,
+        dv: Vector3::z() * (top - bottom),
         triangle: false,
         material,
-        uv: [-wall.length, 0.0],
+        uv: [-wall.length, bottom],
     };
     builder.perforated(patch, &rectangles);
 }
 
-fn skirting(wall: &Wall, material: MaterialId, builder: &mut Builder) {
+/// Boards of a thickness and a height along the foot of a wall, but for its doors with their casings.
+pub(crate) fn skirting(wall: &Wall, [thickness, height]: [f64; 2], material: MaterialId, builder: &mut Builder) {
     let mut from = 0.0;
     let mut doors: Vec<[f64; 2]> =
         wall.openings.iter().filter(|o| o.filling == Filling::Door).map(|o| o.along).collect();
@@ -309,7 +319,7 @@ fn skirting(wall: &Wall, material: MaterialId, builder: &mut Builder) {
     doors.push([wall.length + 0.07, wall.length]);
     for [start, end] in doors {
         if start - 0.07 > from {
-            builder.cuboid(&wall.frame, [from, 0.0, 0.0], [start - 0.07, 0.015, 0.09], material);
+            builder.cuboid(&wall.frame, [from, 0.0, 0.0], [start - 0.07, thickness, height], material);
         }
         from = end + 0.07;
     }

@@ -17,7 +17,7 @@ use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
 use crate::texture::{Color, mix};
 use crate::view::{RobotPose, View};
-use crate::{furniture, laboratory, shell};
+use crate::{furniture, laboratory, shell, yard};
 
 /// Greatest radiance that the camera sees, in units of white in the room's light: what is brighter is burnt out anyway, and
 /// would fray the edges of windows and lamps.
@@ -77,11 +77,16 @@ impl World {
     pub fn new(options: &RoomOptions) -> Result<Self> {
         options.validate()?;
         let mut rng = Rng::new(options.seed, options.kind as u64);
-        let plan = Plan::draw(options, &mut rng);
+        let mut plan = Plan::draw(options, &mut rng);
         let mut builder = Builder::default();
-        shell::build(&plan, &mut builder, &mut rng);
-        let places = furniture::furnish(&plan, options, &mut builder, &mut rng);
-        let mut corners = corner::of_room(&plan);
+        let (mut corners, mut places) = (Vec::new(), Vec::new());
+        if options.kind == RoomKind::Yard {
+            yard::build(&mut plan, options.clutter, &mut builder, &mut rng);
+        } else {
+            shell::build(&plan, &mut builder, &mut rng);
+            places = furniture::furnish(&plan, options, &mut builder, &mut rng);
+            corners = corner::of_room(&plan);
+        }
         corners.append(&mut builder.corners);
         Self::lit(plan, builder, corners, places, options.light_spacing_m)
     }

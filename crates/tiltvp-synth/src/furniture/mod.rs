@@ -167,7 +167,7 @@ fn choose(kind: RoomKind, rng: &mut Rng) -> Piece {
         RoomKind::LivingRoom => {
             rng.pick([Bookshelf, Bookshelf, Cupboard, Sideboard, Sideboard, Sofa, Sofa, Plant, FloorLamp, Chair])
         }
-        RoomKind::Corridor => rng.pick([Bin, Plant, Cupboard, Chair, Bookshelf, Cupboard]),
+        RoomKind::Corridor | RoomKind::Yard => rng.pick([Bin, Plant, Cupboard, Chair, Bookshelf, Cupboard]),
         RoomKind::LShaped => {
             rng.pick([Bookshelf, Cupboard, Sideboard, Desk, Sofa, Plant, FloorLamp, Chair, Bookshelf, Rack])
         }

@@ -42,7 +42,7 @@ pub(crate) fn freestanding(
                     .or_else(|| dining(&middle, layout, palette, builder, rng));
                 places.extend(place);
             }
-            RoomKind::Corridor | RoomKind::Narrow => {}
+            RoomKind::Corridor | RoomKind::Narrow | RoomKind::Yard => {}
         }
     }
     places
