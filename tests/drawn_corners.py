@@ -57,6 +57,25 @@ def drawn(
     return photographed(picture, noise)
 
 
+def on_wall(
+    rotation: np.ndarray,
+    columns: tuple[int, ...],
+    *,
+    size_m: tuple[float, float] = (0.3, 0.3),
+    right_m: float = 0.0,
+    fine: int = 8,
+) -> np.ndarray:
+    """Dark rectangles in three rows and in columns 80 cm apart, on a wall along x and y, 2 m away."""
+    picture = np.full((360 * fine, 480 * fine, 3), 150, np.uint8)
+    for column in columns:
+        for row in range(-1, 2):
+            corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * size_m + (0.8 * column, 0.6 * row)
+            places = np.column_stack([corners, np.zeros(4)]) @ rotation.T + (-right_m, 0.0, 2.0)
+            pixels = places[:, :2] / places[:, 2:] * 400.0 + (240.0, 180.0)
+            cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], (60, 60, 60), shift=4)
+    return photographed(picture, 1.0)
+
+
 def photographed(picture: np.ndarray, noise: float, seed: int = 5) -> np.ndarray:
     """What the camera makes of a fine picture: light blurred, rolled off above 0.7, and noisy."""
     light = (picture.astype(np.float32) / 255.0) ** 2.2

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pair, photographed, pose
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, on_wall, pair, pose
 from tiltvp.corner import BelievedCorner, CornerPoseEstimator, join_boxes
 from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows, pose_rows
 from tiltvp.errors import InvalidInputError
@@ -196,20 +196,6 @@ def test_a_box_that_stands_turned_against_the_walls_is_listed_beside_them() -> N
     assert np.count_nonzero(away_m > 2.0) >= 2, away_m
 
 
-def squares(right_m: float, columns: tuple[int, ...]) -> np.ndarray:
-    """Dark squares of 30 cm in columns 80 cm apart, on a wall 2 m away."""
-    rotation, _ = pose(yaw=0.0, pitch=0.0, roll=0.0)
-    fine = 8
-    picture = np.full((360 * fine, 480 * fine, 3), 150, np.uint8)
-    for column in columns:
-        for row in range(-1, 2):
-            corners = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.0, 0.3]]) + (0.8 * column, 0.6 * row)
-            places = np.column_stack([corners, np.zeros(4)]) @ rotation.T + (-right_m, 0.0, 2.0)
-            pixels = places[:, :2] / places[:, 2:] * 400.0 + (240.0, 180.0)
-            cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], (60, 60, 60), shift=4)
-    return photographed(picture, 1.0)
-
-
 def test_corners_of_which_one_edge_is_not_seen_are_poses() -> None:
     rotation, vertex = pose()
     # A silhouette: all faces have one level.
@@ -231,16 +217,17 @@ def test_corners_of_which_one_edge_is_not_seen_are_poses() -> None:
     # Two colours of three.
     picture = draw_corners(images[0], CAMERA, [feature]).reshape(-1, 3).astype(int)
     assert set(picture[np.ptp(picture, axis=1) > 120].argmax(axis=1)) == {0, 1, 2} - {2 - unseen}
-    # Without a vertical nothing tells what the edges run along.
-    assert CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general")(*images).pose is None
+    # Without a vertical nothing tells what the edges run along, and of what is parallel to nothing other edges do not.
+    for known in ({}, {"down": rotation[:, 1], "parallel_max_rad": 0.0}):
+        assert CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", **known)(*images).pose is None
 
 
 def test_which_of_many_like_corners_both_images_show_is_told_by_a_distance_alone() -> None:
+    rotation, _ = pose(yaw=0.0, pitch=0.0, roll=0.0)
     # A square of the other column, where the right image does not show it, would be a quarter of a metre away.
-    images = [squares(0.0, (0, 1)), squares(0.12, (0,))]
+    images = [on_wall(rotation, (0, 1)), on_wall(rotation, (0,), right_m=0.12)]
     left_from_right = np.eye(4)
     left_from_right[0, 3] = 0.12
-    rotation, _ = pose(yaw=0.0, pitch=0.0, roll=0.0)
     found = {
         nearest_m: CornerPoseEstimator(
             CAMERA, CAMERA, left_from_right, method="general", down=rotation[:, 1], distance_min_m=nearest_m
@@ -248,6 +235,6 @@ def test_which_of_many_like_corners_both_images_show_is_told_by_a_distance_alone
         for nearest_m in (0.2, 1.0)
     }
     assert found[0.2].pose is None
-    on_wall = rotation.T @ (found[1.0].pose.vertex_m - (0.0, 0.0, 2.0))
-    assert np.abs(on_wall - 0.3 * np.rint(on_wall / 0.3)).max() < 0.01, on_wall
-    assert on_wall[0] < 0.4, on_wall
+    place = rotation.T @ (found[1.0].pose.vertex_m - (0.0, 0.0, 2.0))
+    assert np.abs(place - 0.3 * np.rint(place / 0.3)).max() < 0.01, place
+    assert place[0] < 0.4, place

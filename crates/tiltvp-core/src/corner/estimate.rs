@@ -22,11 +22,13 @@ pub enum CornerVerdict {
     NotOfOnePair,
     /// None fits, and most edges contradict the direction of gravity that is told.
     AgainstGravity,
+    /// The edges of one image leave a turn of the attitude open.
+    LeftOpen,
 }
 
 impl CornerVerdict {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Found,
         Self::NoneLeft,
         Self::NoneRight,
@@ -34,6 +36,7 @@ impl CornerVerdict {
         Self::Ambiguous,
         Self::NotOfOnePair,
         Self::AgainstGravity,
+        Self::LeftOpen,
     ];
 
     /// In words.
@@ -46,6 +49,7 @@ impl CornerVerdict {
             Self::Ambiguous => "several hypotheses and nothing to choose by",
             Self::NotOfOnePair => "edges of both images contradict the calibration of the pair",
             Self::AgainstGravity => "no corner that fits, and most edges contradict the gravity that is told",
+            Self::LeftOpen => "too few edges along some axis to tell the attitude from one image",
         }
     }
 }
@@ -140,6 +144,11 @@ impl Hypothesis {
     /// Where the left camera is in the object's frame, metres.
     pub fn camera_in_object_m(&self) -> Option<Vector3<f64>> {
         self.vertex_m.map(|vertex| -(self.camera_from_object.transpose() * vertex))
+    }
+
+    /// The covariance of the attitude's rotation vector, left camera's frame.
+    pub fn attitude_covariance(&self) -> Matrix3<f64> {
+        self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
 }
 

@@ -1,14 +1,13 @@
 //! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
 
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
-use super::agreement::{SAME_VERTEX_RAD, agreement, as_scattered, fits, renamed};
+use super::agreement::{SAME_VERTEX_RAD, fits, renamed};
 use super::frame_knowledge::FrameKnowledge;
 use super::names::CornerNames;
 use super::seen_pair::SeenPair;
 use super::track::Track;
 use crate::corner::closed_form::attitude::IncludedAngle;
-use crate::corner::closed_form::resolve::{Alignment, ResolvedAttitude, View, resolve};
 use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
@@ -147,7 +146,11 @@ impl CornerPoseEstimator {
         if estimate.hypotheses.is_empty() && matches!(self.left.options().method, CornerMethod::General(_)) {
             let (mut fainter, of_fainter, common) = self.look(left, right, FAINT)?;
             if let Some(common) = common.filter(|_| fainter.hypotheses.is_empty()) {
-                self.by_l_junctions(frames, &common, &mut fainter)?;
+                if right.is_some() {
+                    self.by_l_junctions(frames, &common, &mut fainter)?;
+                } else {
+                    self.by_l_junction(left, &common, &mut fainter);
+                }
             }
             if !fainter.hypotheses.is_empty() {
                 (estimate, seen) = (fainter, of_fainter);
@@ -225,7 +228,9 @@ impl CornerPoseEstimator {
         let is_beside = |best: &Hypothesis| {
             beside.is_some_and(|beside| self.are_parallel(&best.camera_from_object, &beside.camera_from_object))
         };
-        if estimate.hypotheses.first().is_some_and(|best| !is_beside(best) && self.stands_alone(best, corners)) {
+        let is_left_open = estimate.hypotheses.first().is_some_and(|best| self.is_left_open_amid_edges(best, corners));
+        let stands_alone = |best: &Hypothesis| !is_beside(best) && self.stands_alone(best, corners);
+        if is_left_open || estimate.hypotheses.first().is_some_and(stands_alone) {
             estimate.hypotheses.clear();
             (estimate.chosen_left, estimate.chosen_right) = (Vec::new(), None);
         }
@@ -236,6 +241,8 @@ impl CornerPoseEstimator {
             estimate.verdict = CornerVerdict::NotOfOnePair;
         } else if common.is_some_and(|common| self.is_against_gravity(&common)) {
             estimate.verdict = CornerVerdict::AgainstGravity;
+        } else if is_left_open {
+            estimate.verdict = CornerVerdict::LeftOpen;
         }
         Ok((estimate, seen, common))
     }
@@ -307,50 +314,6 @@ impl CornerPoseEstimator {
     pub(super) fn right_handed(&self) -> Option<bool> {
         let told = matches!(self.left.options().method, CornerMethod::Coloured(_));
         self.options.right_handed.or(told.then_some(true))
-    }
-
-    /// Attitudes from one image: of all features that agree with one another; none where the likeliest one's features contradict
-    /// each other or gravity.
-    fn by_one(&self, common: Option<&CommonAttitude>, estimate: &mut CornerEstimate) -> Result<()> {
-        let common = common.filter(|_| self.options.parallel_max_rad > 0.0);
-        let members = self.parallel_to(common, &estimate.features[0]);
-        let features: Vec<CornerFeature> = members.iter().map(|member| estimate.features[0][*member]).collect();
-        let priors = self.priors(self.is_one_object());
-        let Some(agreed) = agreement(&features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
-            return Ok(());
-        };
-        let view = |attitudes| View { attitudes, common_from_camera: Matrix3::identity() };
-        let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
-        let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
-        let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
-        let covariance_of = |attitude: &ResolvedAttitude| {
-            if self.is_one_object() { attitude.covariance } else { as_scattered(attitude, views.len()) }
-        };
-        let mut hypotheses: Vec<Hypothesis> = resolved
-            .iter()
-            .filter_map(|resolved| {
-                let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
-                let mut covariance = Matrix6::zeros();
-                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&covariance_of(resolved));
-                Some(Hypothesis {
-                    camera_from_object: self.named(resolved.common_from_object),
-                    edges: chosen.edges,
-                    vertex_m: None,
-                    covariance,
-                    probability: resolved.probability,
-                    right_handed: chosen.is_right_handed(),
-                    misfit: (resolved.chi_square / (3 * (views.len() - 1)).max(1) as f64).sqrt(),
-                })
-            })
-            .collect();
-        let Some(pose) = hypotheses.first_mut() else { return Ok(()) };
-        let corners: Vec<&CornerFeature> = agreed.members.iter().map(|member| &features[*member]).collect();
-        let may_be = self.take_common(pose, common, &corners);
-        if may_be && pose.misfit <= self.options.misfit_max && self.is_upright(pose) {
-            let chosen_left = agreed.members.iter().map(|member| members[*member]).collect();
-            (estimate.hypotheses, estimate.chosen_left) = (hypotheses, chosen_left);
-        }
-        Ok(())
     }
 
     /// The attitude with its edges named as they were in the frame before.

@@ -93,7 +93,7 @@ fn placed(
     let down = if upright.dot(&bearing) < 0.0 { -upright } else { upright };
     let drop = down.dot(&bearing);
     let distance_m = height_m / drop;
-    let attitude: Matrix3<f64> = pose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let attitude = pose.attitude_covariance();
     let by_bearing = (Matrix3::identity() - bearing * down.transpose() / drop) * distance_m;
     let by_attitude = -bearing * down.cross(&bearing).transpose() * (distance_m / drop);
     let by_height = bearing * (height_sigma_m / drop);

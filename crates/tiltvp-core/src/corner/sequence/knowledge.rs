@@ -71,10 +71,10 @@ impl CornerPoseEstimator {
     /// cuboid may be held aslant.
     pub(super) fn is_upright(&self, pose: &Hypothesis) -> bool {
         self.is_one_object()
-            || self.known.gravity.is_none_or(|gravity| {
-                let covariance = pose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-                gravity.is_along(&pose.camera_from_object, &covariance)
-            })
+            || self
+                .known
+                .gravity
+                .is_none_or(|gravity| gravity.is_along(&pose.camera_from_object, &pose.attitude_covariance()))
     }
 
     /// Covariance of the attitude of a track as it is known at this frame, before its images.

@@ -7,6 +7,7 @@ pub(super) mod frame_knowledge;
 mod height;
 mod knowledge;
 pub(super) mod names;
+mod one_image;
 mod pair_search;
 mod pairs;
 mod paper;

@@ -4,7 +4,6 @@ use super::agreement::apart;
 use super::estimator::CornerPoseEstimator;
 use super::seen_pair::SeenPair;
 use super::support::CornerSupport;
-use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::detector::CornerDetector;
 use crate::corner::estimate::{CornerEstimate, CornerVerdict};
@@ -90,8 +89,7 @@ impl CornerPoseEstimator {
         common: &CommonAttitude,
         estimate: &mut CornerEstimate,
     ) -> Result<()> {
-        let is_told = self.options.angle == IncludedAngle::RIGHT && self.is_of_most(common);
-        if !is_told || common.turned_apart.is_some() || self.is_against_gravity(common) {
+        if !self.is_told_by_most(common) {
             return Ok(());
         }
         let features = self.l_junctions(frames, &common.camera_from_object);
