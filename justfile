@@ -348,6 +348,10 @@ measure-visp folder: setup
 measure-corners *arguments: setup
     {{bin}}/tiltvp measure corners --overwrite --out out/corners {{arguments}}
 
+# Attitudes by one camera with gravity: facades, furniture, and the panoramas of TILTVP_DATA.
+measure-corner-attitudes *arguments: setup
+    {{bin}}/tiltvp measure corner-attitudes "$TILTVP_DATA/panos" {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py

@@ -11,6 +11,7 @@ from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration, trust_pictures
 from tiltvp.cli.lab.colmap import colmap
+from tiltvp.cli.lab.corner_attitude_measures import corner_attitudes
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
@@ -34,6 +35,7 @@ app.command(body)
 app.command(calibration)
 app.command(calibration_images)
 app.command(colmap)
+app.command(corner_attitudes)
 app.command(corners)
 app.command(corners_real)
 app.command(descriptors)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from tiltvp.corner_images import CornerEstimate, CornerHypothesis
-from tiltvp.synth import StereoSequence
+from tiltvp.synth import SceneCorner, StereoSequence
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["attitude_near", "own_places", "surface_off", "truth_near"]
+__all__ = ["attitude_near", "attitudes_of", "named_near", "own_places", "rotation_vector", "surface_off", "truth_near"]
 
 _SAME_M: Final = 0.08
 """An estimate is of the listed corner that is this near"""
@@ -111,6 +111,23 @@ def attitude_near(sequence: StereoSequence, frame: int, camera_from_object: NDAr
     that of one camera, which tells no place.
     """
     from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])[:3, :3]
-    listed = np.unique(np.round([corner.world_from_object for corner in sequence.corners], 9), axis=0)
-    every = [from_world @ attitude @ naming for attitude in listed for naming in _NAMINGS]
-    return max(every, key=lambda one: float(np.trace(one @ camera_from_object.T)))
+    return named_near([from_world @ attitude for attitude in attitudes_of(sequence.corners)], camera_from_object)
+
+
+def attitudes_of(corners: Sequence[SceneCorner]) -> NDArray[np.float64]:
+    """(N, 3, 3): the different attitudes of corners, in the world."""
+    listed: NDArray[np.float64] = np.unique(np.round([corner.world_from_object for corner in corners], 9), axis=0)
+    return listed
+
+
+def named_near(attitudes: Iterable[NDArray[np.float64]], estimate: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The one of some attitudes (3, 3), its axes named as the estimate has them, that is nearest to it."""
+    every = [attitude @ naming for attitude in attitudes for naming in _NAMINGS]
+    return max(every, key=lambda one: float(np.trace(one @ estimate.T)))
+
+
+def rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,): from the rotation's quaternion, for any angle."""
+    import cv2
+
+    return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()

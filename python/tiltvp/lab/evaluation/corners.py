@@ -17,7 +17,13 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.corner_inertial import IMAGE, InertialLooks, compare_inertial
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks, MarkerPose
-from tiltvp.lab.evaluation.corner_rooms import attitude_near, own_places, surface_off, truth_near
+from tiltvp.lab.evaluation.corner_rooms import (
+    attitude_near,
+    own_places,
+    rotation_vector,
+    surface_off,
+    truth_near,
+)
 from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, down_in
 
 if TYPE_CHECKING:
@@ -269,7 +275,7 @@ def _judged(
     found = pose is not None and pose.vertex_m is not None
     row = _frame_row(sequence, frame, found=found) | {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason}
     if pose is not None and pose.vertex_m is None and scene.kind != "laboratory":
-        turn = _rotation_vector(attitude_near(sequence, frame, pose.camera_from_object) @ pose.camera_from_object.T)
+        turn = rotation_vector(attitude_near(sequence, frame, pose.camera_from_object) @ pose.camera_from_object.T)
         nees = float(turn @ np.linalg.solve(pose.covariance[:3, :3], turn))
         return row | {"found": True, "attitude_deg": float(np.degrees(np.linalg.norm(turn))), "nees": nees}
     if pose is None or pose.vertex_m is None:
@@ -280,7 +286,7 @@ def _judged(
     else:
         number, truth = truth_near(sequence, frame, pose, places[estimate.object])
     error = np.concatenate([
-        _rotation_vector(truth[:3, :3] @ pose.camera_from_object.T), truth[:3, 3] - pose.vertex_m
+        rotation_vector(truth[:3, :3] @ pose.camera_from_object.T), truth[:3, 3] - pose.vertex_m
     ])  # fmt: skip
     return (
         row
@@ -317,7 +323,7 @@ def _errors(
     truth: NDArray[np.float64], rotation: NDArray[np.float64], vertex_m: NDArray[np.float64]
 ) -> dict[str, float]:
     """How far a pose is from the true one, (4, 4)."""
-    turn = _rotation_vector(truth[:3, :3] @ rotation.T)
+    turn = rotation_vector(truth[:3, :3] @ rotation.T)
     place = truth[:3, :3].T @ truth[:3, 3] - rotation.T @ vertex_m
     pitch, yaw, roll = np.degrees(turn).tolist()
     x, y, z = place.tolist()
@@ -331,10 +337,3 @@ def _errors(
         "y_m": y,
         "z_m": z,
     }
-
-
-def _rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,): from the rotation's quaternion, for any angle."""
-    import cv2
-
-    return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()
