@@ -17,10 +17,12 @@ from tiltvp.corner import CornerPoseEstimator
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
 from tiltvp.lines import LineExtractor, match_wide
-from tiltvp.overlays.corners import draw_box, draw_corners
+from tiltvp.overlays.corners import EDGE_COLOURS, draw_box, draw_corners
 from tiltvp.overlays.lines import draw_lines, line_pixels, track_colour
 from tiltvp.overlays.offsets import error_chart
 from tiltvp.overlays.tilt import draw_words, tilt_overlay
+from tiltvp.rotations import levelling as levelling_rotation
+from tiltvp.segments import SegmentDetector
 from tiltvp.streams import Wheels, frame_motions, open_frames
 from tiltvp.synth import MIRROR_BLIND_RAD, Laboratory, Room, StereoSequence, mirror_camera, zed_cameras
 
@@ -49,6 +51,7 @@ def main(names: Sequence[str]) -> None:
         "level": lambda: levelling(room, pose),
         "lens": lambda: checked_lens(room),
         "corner": corners,
+        "facade": facades,
         "colmap": lambda: gravity(room, pose),
         "datasets": lambda: known_leans(room, pose),
         "recordings": recording,
@@ -117,6 +120,28 @@ def corners() -> None:
     u, v = (round(place) for place in left.project(estimate.pose.vertex_m))
     part = (slice(max(v - 160, 0), v + 160), slice(max(u - 240, 0), u + 240))
     write("corner.jpg", [pictures[0][part], canvas[part]])
+
+
+def facades() -> None:
+    """Fronts of houses, and what one camera that knows a vertical makes of them: a corner, and edges by their axis."""
+    room = Room("yard", 1)
+    camera = tiltvp.Camera.pinhole(width=1280, height=720, fx=700.0, fy=700.0, cx=639.5, cy=359.5)
+    up = np.array([0.0, -math.cos(0.25), math.sin(0.25)])
+    mounting = levelling_rotation(FORWARD @ up) @ FORWARD
+    place = room.free_poses(2, 1)[1]
+    image = room.render(camera, pose=place, robot_from_camera=mounting, camera_height_m=1.6, samples=3).bgr
+    estimate = CornerPoseEstimator(camera, method="general")(image, gravity=(-up, 0.01))
+    assert estimate.pose is not None
+    canvas = image.copy()
+    segments = SegmentDetector(camera)(image)
+    sines = np.abs(segments.normal @ estimate.pose.camera_from_object)
+    for ends, sine in zip(segments.ends, sines, strict=True):
+        if sine.min() < math.sin(math.radians(2.0)):
+            pixels = [tuple(round(place) for place in camera.project(end)) for end in ends]
+            cv2.line(canvas, *pixels, EDGE_COLOURS[int(sine.argmin())], 2, cv2.LINE_AA)
+    u, v = (round(place) for place in camera.project(estimate.features_left[estimate.chosen_left[0]].vertex))
+    cv2.circle(canvas, (u, v), 14, (0, 255, 255), 3, cv2.LINE_AA)
+    write("facade.jpg", [cv2.resize(picture, (640, 360), interpolation=cv2.INTER_AREA) for picture in (image, canvas)])
 
 
 def gravity(room: Room, pose: np.ndarray) -> None:

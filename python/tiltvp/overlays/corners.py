@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_box", "draw_corners", "draw_names"]
 
-_EDGE_COLOURS = ((60, 60, 255), (80, 220, 80), (255, 140, 60))
+EDGE_COLOURS = ((60, 60, 255), (80, 220, 80), (255, 140, 60))
 """BGR of the edges x, y, z."""
 _BOX = (170, 170, 170)
 _POINTS = 24
@@ -41,7 +41,7 @@ def draw_corners(
     order = sorted(range(len(features)), key=lambda place: place in wanted)
     for place in order:
         feature, width = features[place], 2 if place in wanted else 1
-        for toward, colour, support in zip(feature.toward, _EDGE_COLOURS, feature.support_px, strict=True):
+        for toward, colour, support in zip(feature.toward, EDGE_COLOURS, feature.support_px, strict=True):
             if support == 0:
                 continue
             share = np.linspace(0.0, 1.0, _POINTS)[:, None]
@@ -68,7 +68,7 @@ def draw_box(
         others = [axes[j] for j in range(3) if j != k]
         for start in (others[0], others[1], others[0] + others[1]):
             _curve(canvas, camera, origin + start + axis * share, _BOX, 1)
-    for axis, colour in zip(axes, _EDGE_COLOURS, strict=True):
+    for axis, colour in zip(axes, EDGE_COLOURS, strict=True):
         _curve(canvas, camera, origin + axis * share, colour, 2)
 
 
