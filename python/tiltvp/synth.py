@@ -95,7 +95,7 @@ class Room(_core.Room):
     room does not depend on it. None stands for what is usual: `clutter` and `daylight` from 0 to 1 are how full it is
     and how bright the day outside, `light_spacing_m` how finely light is gathered, `extent` from 1 to 4 how many times
     larger than usual the floor is, `floor_gloss` from 0 to 1 how much it shines (0), and `wall_pattern` what all walls
-    have in common, one of `WALL_PATTERNS`: stripes, panels or tiles, equally spaced, or nothing (drawn).
+    have in common, one of `WALL_PATTERNS`: stripes, panels or tiles, equally spaced, or nothing (drawn; so of a yard).
 
     Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """

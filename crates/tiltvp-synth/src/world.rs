@@ -8,8 +8,7 @@ use crate::corner::{self, Corner};
 use crate::laboratory::LaboratoryOptions;
 use crate::light::{LightMap, sun_reaches};
 use crate::lights::Lights;
-use crate::options::RoomKind;
-use crate::options::RoomOptions;
+use crate::options::{RoomKind, RoomOptions, WallPattern};
 use crate::outdoors::Outdoors;
 use crate::plan::Plan;
 use crate::rng::Rng;
@@ -76,6 +75,13 @@ impl World {
     /// If the options are outside their domains.
     pub fn new(options: &RoomOptions) -> Result<Self> {
         options.validate()?;
+        if options.kind == RoomKind::Yard && options.wall_pattern != WallPattern::Drawn {
+            return Err(Error::option(
+                "wall_pattern",
+                options.wall_pattern.name(),
+                "drawn, as houses of a yard differ",
+            ));
+        }
         let mut rng = Rng::new(options.seed, options.kind as u64);
         let mut plan = Plan::draw(options, &mut rng);
         let mut builder = Builder::default();

@@ -217,6 +217,8 @@ fn wrong_options_are_refused_by_name() {
     refused(RoomOptions { extent: 0.5, ..room.clone() }.validate(), "extent");
     refused(RoomOptions { floor_gloss: -0.5, ..room.clone() }.validate(), "floor_gloss");
     refused("plaid".parse::<WallPattern>().map(|_| ()), "wall_pattern");
+    let yard = RoomOptions { wall_pattern: WallPattern::Stripes, ..RoomOptions::new(RoomKind::Yard, 1) };
+    refused(World::new(&yard).map(|_| ()), "wall_pattern");
     refused(RoomOptions { light_spacing_m: 0.0, ..room }.validate(), "light_spacing_m");
     let base = RenderOptions::default();
     refused(RenderOptions { samples: 0, ..base.clone() }.validate(), "samples");
