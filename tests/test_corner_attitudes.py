@@ -14,6 +14,8 @@ from drawn_corners import CAMERA, on_wall, pose
 from tiltvp.cli import main
 from tiltvp.corner import CornerEstimate, CornerPoseEstimator
 
+LEFT_OPEN = "too few edges along some axis to tell the attitude from one image"
+
 
 def looked(image: np.ndarray, rotation: np.ndarray, *, told: bool = True) -> CornerEstimate:
     gravity = (rotation[:, 1], math.radians(1.0)) if told else None
@@ -36,7 +38,9 @@ def test_windows_of_a_wall_tell_one_camera_its_attitude() -> None:
 def test_small_windows_leave_a_turn_open() -> None:
     rotation, _ = pose(yaw=30.0, pitch=12.0)
     # Most of their level edges are too short to count, or far: 0.9 degrees.
-    assert looked(on_wall(rotation, (-1, 0, 1)), rotation).pose is None
+    estimate = looked(on_wall(rotation, (-1, 0, 1)), rotation)
+    assert estimate.pose is None
+    assert estimate.reason == LEFT_OPEN
 
 
 def test_one_corner_that_leaves_a_turn_open_is_none_amid_many_edges() -> None:
@@ -57,7 +61,7 @@ def test_one_corner_that_leaves_a_turn_open_is_none_amid_many_edges() -> None:
         cv2.line(image, *ends, (40, 40, 40), 2, cv2.LINE_AA, shift=4)
     estimate = looked(image, rotation)
     assert estimate.pose is None
-    assert estimate.reason == "too few edges along some axis to tell the attitude from one image"
+    assert estimate.reason == LEFT_OPEN
 
 
 def test_measured_on_facades(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

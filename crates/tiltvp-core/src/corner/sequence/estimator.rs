@@ -154,6 +154,8 @@ impl CornerPoseEstimator {
             }
             if !fainter.hypotheses.is_empty() {
                 (estimate, seen) = (fainter, of_fainter);
+            } else if fainter.verdict == CornerVerdict::LeftOpen && estimate.verdict != CornerVerdict::AgainstGravity {
+                estimate.verdict = CornerVerdict::LeftOpen;
             }
         }
         if let (Some(_), Some(left), Some(right)) =

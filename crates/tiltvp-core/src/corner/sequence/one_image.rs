@@ -58,7 +58,11 @@ impl CornerPoseEstimator {
 
     /// The attitude of most edges of one image, at the L-junction with the longest rays, where no corner of three edges tells one.
     pub(super) fn by_l_junction(&mut self, frame: &Frame<'_>, common: &CommonAttitude, estimate: &mut CornerEstimate) {
-        if !self.is_told_by_most(common) || self.is_left_open(&common.covariance) {
+        if !self.is_told_by_most(common) {
+            return;
+        }
+        if self.is_left_open(&common.covariance) {
+            estimate.verdict = CornerVerdict::LeftOpen;
             return;
         }
         let [features, _] = self.l_junctions([frame, frame], &common.camera_from_object);
