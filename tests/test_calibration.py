@@ -126,15 +126,6 @@ def test_a_bump_raises_the_alarm_and_an_undisturbed_drive_does_not() -> None:
     assert not calibrator.estimate.alarm
 
 
-def test_the_paper_filter_is_there_and_worse() -> None:
-    errors = {"default": [], "paper": []}
-    for seed in range(15):
-        drive = simulate_drive("alternating", seed=seed)
-        for method, found in errors.items():
-            found.append(np.abs(error(followed(drive, method=method, start_sigma=(0.05, 0.08, 0.5)).estimate)).max())
-    assert np.median(errors["default"]) < np.median(errors["paper"])
-
-
 def test_the_same_drive_gives_the_same_answer_by_steps_by_log_and_by_copy() -> None:
     drive = simulate_drive("paper", seed=7)
     stepped = tiltvp.SelfCalibrator(**START)

@@ -7,7 +7,7 @@ use super::model::{MOST_LANDMARKS, Mounting, WheelMotion};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
 use super::paper::PaperFilter;
 use super::step_outcome::StepOutcome;
-use super::window::SlidingWindow;
+use super::window::{InnovationMonitor, SlidingWindow};
 use crate::error::{Error, Result};
 
 /// What the calibrator did in a step.
@@ -27,7 +27,7 @@ pub struct CalibrationStep {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Filter {
     SlidingWindow(Box<SlidingWindow>),
-    Paper(Box<PaperFilter>),
+    Paper(Box<PaperFilter>, InnovationMonitor),
 }
 
 /// Estimates where the camera sits on the robot from wheel displacements and bearings of identified landmarks.
@@ -36,7 +36,6 @@ enum Filter {
 pub struct SelfCalibrator {
     options: SelfCalibratorOptions,
     filter: Filter,
-    last_nis: Option<f64>,
 }
 
 impl SelfCalibrator {
@@ -48,9 +47,11 @@ impl SelfCalibrator {
         options.validate()?;
         let filter = match options.method {
             CalibrationMethod::Default => Filter::SlidingWindow(Box::new(SlidingWindow::new(&options)?)),
-            CalibrationMethod::Paper => Filter::Paper(Box::new(PaperFilter::new(&options))),
+            CalibrationMethod::Paper => {
+                Filter::Paper(Box::new(PaperFilter::new(&options)), InnovationMonitor::default())
+            }
         };
-        Ok(Self { options, filter, last_nis: None })
+        Ok(Self { options, filter })
     }
 
     /// The options in force.
@@ -63,7 +64,7 @@ impl SelfCalibrator {
         self.options.validate().is_ok()
             && match &self.filter {
                 Filter::SlidingWindow(filter) => filter.is_well_formed(),
-                Filter::Paper(filter) => filter.is_well_formed(),
+                Filter::Paper(filter, _) => filter.is_well_formed(),
             }
     }
 
@@ -87,11 +88,13 @@ impl SelfCalibrator {
         let seen: Vec<(u64, f64)> = landmarks.iter().copied().zip(bearings_rad.iter().copied()).collect();
         let StepOutcome { nis, used, rejected, started, .. } = match &mut self.filter {
             Filter::SlidingWindow(filter) => filter.step(motion, &seen),
-            Filter::Paper(filter) => filter.step(motion, &seen),
+            Filter::Paper(filter, monitor) => {
+                let outcome = filter.step(motion, &seen);
+                // Without a gate no bearing is rejected, which is what its limit would be for.
+                monitor.record(&outcome, 0.0);
+                outcome
+            }
         };
-        if used > 0 {
-            self.last_nis = Some(nis / used as f64);
-        }
         Ok(CalibrationStep { nis, used, rejected, started })
     }
 
@@ -107,7 +110,7 @@ impl SelfCalibrator {
     pub fn landmarks(&self) -> usize {
         match &self.filter {
             Filter::SlidingWindow(filter) => filter.landmarks(),
-            Filter::Paper(filter) => filter.landmarks(),
+            Filter::Paper(filter, _) => filter.landmarks(),
         }
     }
 
@@ -128,15 +131,16 @@ impl SelfCalibrator {
                 .judged(examination.contradictions, examination.suspect)
                 .doubting(examination.doubted_centre.as_ref(), || filter.covariance_by_centre(), start)
             }
-            Filter::Paper(filter) => {
+            Filter::Paper(filter, monitor) => {
+                let nis = monitor.mean_nis();
                 let Some((polar, covariance)) = filter.mounting() else {
                     let nowhere = Mounting::from_vector(&Vector3::repeat(f64::NAN));
                     let infinite = Matrix3::from_diagonal_element(f64::INFINITY);
-                    return MountingEstimate::new(nowhere, infinite, start, self.last_nis, true);
+                    return MountingEstimate::new(nowhere, infinite, start, nis, true);
                 };
                 let mounting = Mounting::from_polar(polar.x, polar.y, polar.z);
                 let xy = vector_covariance(&polar, &covariance);
-                MountingEstimate::new(mounting, xy, start, self.last_nis, false)
+                MountingEstimate::new(mounting, xy, start, nis, monitor.alarmed())
             }
         }
     }
@@ -205,11 +209,30 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_papers_filter_tells_the_last_innovation_that_there_was() {
+    fn of_the_paper() -> SelfCalibrator {
         let options = SelfCalibratorOptions { method: CalibrationMethod::Paper, ..SelfCalibratorOptions::default() };
         let start = Mounting { x_m: 0.2, y_m: 0.0, yaw_rad: 0.0 };
-        let mut calibrator = SelfCalibrator::new(SelfCalibratorOptions { start, ..options }).unwrap();
+        SelfCalibrator::new(SelfCalibratorOptions { start, ..options }).unwrap()
+    }
+
+    /// Of a robot that drives on, past landmarks that fall behind as they should, or that go ahead.
+    #[test]
+    fn the_papers_filter_is_alarmed_by_bearings_that_contradict_it() {
+        for (sense, alarmed) in [(1.0, false), (-1.0, true)] {
+            let mut calibrator = of_the_paper();
+            for step in 0..40 {
+                let bearing = |side: f64, far_m: f64| side * far_m.atan2(2.0 - sense * 0.1 * f64::from(step));
+                let bearings_rad = [bearing(1.0, 2.0), bearing(-1.0, 3.0), bearing(1.0, 4.0)];
+                calibrator.step(&WheelMotion { left_m: 0.1, right_m: 0.1 }, &[0, 1, 2], &bearings_rad).unwrap();
+            }
+            let estimate = calibrator.estimate();
+            assert_eq!(estimate.alarm, alarmed, "{sense}: {:?}", estimate.mean_nis);
+        }
+    }
+
+    #[test]
+    fn the_papers_filter_tells_the_last_innovations_that_there_were() {
+        let mut calibrator = of_the_paper();
         let ahead = WheelMotion { left_m: 0.1, right_m: 0.1 };
         let mut step = |bearings_rad: &[f64]| {
             let landmarks: Vec<u64> = (0..bearings_rad.len() as u64).collect();

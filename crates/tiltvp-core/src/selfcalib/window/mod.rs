@@ -12,4 +12,5 @@ mod step;
 mod tuning;
 mod update;
 
+pub(super) use self::monitor::InnovationMonitor;
 pub(super) use self::state::SlidingWindow;

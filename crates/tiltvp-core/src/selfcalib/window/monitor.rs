@@ -20,7 +20,7 @@ pub(crate) struct InnovationMonitor {
 
 impl InnovationMonitor {
     /// Adds a step; `gate` is the limit of the normalised innovation squared of one bearing.
-    pub(super) fn record(&mut self, outcome: &StepOutcome, gate: f64) {
+    pub(crate) fn record(&mut self, outcome: &StepOutcome, gate: f64) {
         let count = outcome.used + outcome.rejected;
         if count == 0 {
             return;
