@@ -189,6 +189,13 @@ def test_every_item_tells_values_apart(values: dict[str, list[Any]], name: str) 
     }
 
 
+@pytest.mark.parametrize("size_px", [(1, 1), (10**7, 10**7), (2**33, 2**33)])
+def test_edges_are_of_an_image_that_can_be(values: dict[str, list[Any]], size_px: tuple[int, int]) -> None:
+    edges = values["EdgeElements"][0].to_dict()
+    with pytest.raises(InvalidInputError, match="size_px"):
+        _core.EdgeElements.from_dict(edges | {"size_px": size_px})
+
+
 def test_arrays_are_fresh(values: dict[str, list[Any]]) -> None:
     for name in CLASSES:
         for value in values[name]:

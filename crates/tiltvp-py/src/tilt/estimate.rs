@@ -200,6 +200,12 @@ value! {
         if others.iter().any(|m| *m != n) {
             return Err(invalid(format!("values: lists of different lengths, expected {n} of each")));
         }
+        let (width, height) = size_px;
+        let holds = |(u, v): (&u16, &u16)| usize::from(*u) < width && usize::from(*v) < height;
+        if width.max(height) > usize::from(u16::MAX) || !u.iter().zip(&v).all(holds) {
+            let expected = "those of an image that has these pixels, at most 65535";
+            return Err(invalid(format!("values[\"size_px\"]: {size_px:?}, expected {expected}")));
+        }
     };
     repr {
         let inliers = own.inlier.iter().filter(|inlier| **inlier).count();
