@@ -16,7 +16,8 @@ pub struct ConsistencyBand {
 impl ConsistencyBand {
     /// The band about `dof` for the mean of `samples` independent values of `dof` degrees of freedom each (Bar-Shalom, Li
     /// and Kirubarajan, Estimation with Applications to Tracking and Navigation, 5.4.2); a consistent filter misses it with
-    /// probability `1 - probability`. `None` for no samples, no dimension, or a probability outside (0, 1).
+    /// probability `1 - probability`. `None` for no samples, no dimension, or a probability outside (0, 1), or so near to 1 that
+    /// half of what it lacks is none of a float.
     ///
     /// NEES of successive steps are not independent: take one step of each of many runs.
     pub fn of_mean(probability: f64, dof: u32, samples: u32) -> Option<Self> {
@@ -26,7 +27,7 @@ impl ConsistencyBand {
         }
         let tail = 0.5 * (1.0 - probability);
         let bound = |p| chi_square_quantile(p, total) / f64::from(samples);
-        Some(Self { low: bound(tail), high: bound(1.0 - tail) })
+        Some(Self { low: bound(tail), high: bound(1.0 - tail) }).filter(|band| band.high.is_finite())
     }
 
     /// Whether a mean lies in the band.
@@ -55,6 +56,7 @@ mod tests {
         assert_relative_eq!(band.high, 2.5912, max_relative = 1e-4);
         assert!(band.holds(2.0) && !band.holds(2.6) && !band.holds(f64::NAN));
         assert!(ConsistencyBand::of_mean(0.95, 2, 0).is_none() && ConsistencyBand::of_mean(1.0, 2, 3).is_none());
+        assert!(ConsistencyBand::of_mean(1.0 - 0.5 * f64::EPSILON, 2, 3).is_none());
     }
 
     #[test]

@@ -47,7 +47,8 @@ impl WheelLayout {
         let forward = (2.0 * h_c - h_r) / (2.0 * self.caster_behind_m);
         let leftward = h_r / (2.0 * self.half_track_m);
         let cos2 = 1.0 - forward * forward - leftward * leftward;
-        if cos2 < 0.0 {
+        // Differences of finite heights may be none of a float.
+        if cos2.is_nan() || cos2 < 0.0 {
             let expected = format!(
                 "heights that wheels {} m apart and a caster {} m behind them can have",
                 2.0 * self.half_track_m,
@@ -93,6 +94,7 @@ mod tests {
     fn impossible_heights_and_layouts_are_refused() {
         assert!(PAPER.tilt(0.0, 0.0, 0.15).is_err());
         assert!(PAPER.tilt(0.0, f64::NAN, 0.0).is_err());
+        assert!(PAPER.tilt(1e308, -1e308, 0.0).is_err());
         assert!(WheelLayout { half_track_m: 0.0, ..PAPER }.tilt(0.0, 0.0, 0.0).is_err());
         assert!(WheelLayout { caster_behind_m: f64::INFINITY, ..PAPER }.tilt(0.0, 0.0, 0.0).is_err());
     }
