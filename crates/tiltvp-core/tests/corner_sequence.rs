@@ -4,11 +4,13 @@
 
 mod scene;
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use scene::cube;
 use tiltvp_core::corner::{
-    BelievedCorner, CornerDetector, CornerEstimate, CornerPoseEstimator, CornerVerdict, DetectorOptions,
-    EstimatorOptions, Frame, FrameKnowledge, Hypothesis, PlaceVerdict,
+    BelievedCorner, CornerDetector, CornerEstimate, CornerMethod, CornerPoseEstimator, CornerVerdict, DetectorOptions,
+    EstimatorOptions, Frame, FrameKnowledge, GeneralOptions, Hypothesis, IncludedAngle, PlaceVerdict,
 };
 use tiltvp_core::geometry::RigidMotion;
 use tiltvp_core::image::{ColorView, ImageView};
@@ -197,6 +199,25 @@ fn a_corner_whose_third_edge_is_short_is_completed() {
     let is_here = |corner: &&BelievedCorner| (corner.hypotheses[0].vertex_m.unwrap() - vertex_m(0.0)).norm() < 0.02;
     let completed = found.corners.iter().find(is_here).unwrap();
     assert!(attitude_deg(&completed.hypotheses[0]) < 0.5 && place_off_m(&completed.hypotheses[0], 0.0) < 0.006);
+}
+
+#[test]
+fn a_detector_of_another_included_angle_is_refused() {
+    let with = |left_rad: f64, right_rad: f64, gamma_rad: f64| {
+        let side = |gamma_rad: f64| {
+            let method = CornerMethod::General(GeneralOptions { gamma_rad, ..GeneralOptions::default() });
+            CornerDetector::new(cube::pinhole(), DetectorOptions { method, ..DetectorOptions::default() }, None)
+                .unwrap()
+        };
+        let left_from_right = RigidMotion { rotation: Matrix3::identity(), translation_m: Vector3::x() };
+        let options = EstimatorOptions { angle: IncludedAngle::exact(gamma_rad), ..EstimatorOptions::default() };
+        CornerPoseEstimator::new(side(left_rad), Some((side(right_rad), left_from_right)), options)
+    };
+    assert!(with(1.2, 1.2, 1.2).is_ok() && with(1.57, FRAC_PI_2, FRAC_PI_2).is_ok());
+    for (left_rad, right_rad, gamma_rad) in [(1.2, 1.2, FRAC_PI_2), (FRAC_PI_2, FRAC_PI_2, 1.2), (1.2, 1.3, 1.2)] {
+        let told = with(left_rad, right_rad, gamma_rad).unwrap_err().to_string();
+        assert!(told.contains("gamma_rad") && told.contains("as the detector has it"), "{told}");
+    }
 }
 
 #[test]

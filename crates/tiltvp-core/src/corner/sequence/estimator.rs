@@ -34,6 +34,19 @@ pub struct CornerPoseEstimator {
     pub(super) scratch: [CornerScratch; 2],
 }
 
+/// How far the included angles of detector and estimator may be apart, radians: one of them may say 1.57 for a right one.
+const SAME_ANGLE_RAD: f64 = 1e-3;
+
+/// That a detector looks for corners of the included angle that poses are of.
+fn check_angle(detector: &CornerDetector, angle: &IncludedAngle) -> Result<()> {
+    match &detector.options().method {
+        CornerMethod::General(own) if (own.gamma_rad - angle.gamma_rad).abs() > SAME_ANGLE_RAD => {
+            Err(Error::option("gamma_rad", angle.gamma_rad, format!("{}, as the detector has it", own.gamma_rad)))
+        }
+        _ => Ok(()),
+    }
+}
+
 impl CornerPoseEstimator {
     /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame.
     ///
@@ -56,6 +69,9 @@ impl CornerPoseEstimator {
                 return Err(Error::argument(scale, "given", expected));
             }
             check_baseline(left_from_right)?;
+        }
+        for detector in [Some(&left), right.as_ref().map(|(right, _)| right)].into_iter().flatten() {
+            check_angle(detector, &options.angle)?;
         }
         let is_coloured = matches!(left.options().method, CornerMethod::Coloured(_));
         if options.edge_length_m.is_some() && options.known_edge != KnownEdge::Y && !is_coloured {

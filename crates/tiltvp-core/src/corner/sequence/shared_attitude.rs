@@ -186,13 +186,17 @@ mod tests {
     use crate::camera::{Camera, Model, Pinhole};
     use crate::corner::detector::CornerDetector;
     use crate::corner::estimator_options::EstimatorOptions;
-    use crate::corner::options::DetectorOptions;
+    use crate::corner::options::{CornerMethod, DetectorOptions};
 
     /// One camera that knows down, where it is told.
     fn estimator(method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>) -> CornerPoseEstimator {
         let lens = Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap();
         let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
-        let detector = CornerDetector::new(camera, DetectorOptions::for_method(method).unwrap(), None).unwrap();
+        let mut own = DetectorOptions::for_method(method).unwrap();
+        if let CornerMethod::General(general) = &mut own.method {
+            general.gamma_rad = angle.gamma_rad;
+        }
+        let detector = CornerDetector::new(camera, own, None).unwrap();
         let options = EstimatorOptions { angle, down, ..EstimatorOptions::default() };
         CornerPoseEstimator::new(detector, None, options).unwrap()
     }

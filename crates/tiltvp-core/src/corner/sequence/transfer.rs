@@ -190,7 +190,7 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, Model, Pinhole};
-    use crate::corner::{DetectorOptions, EstimatorOptions, IncludedAngle};
+    use crate::corner::{CornerMethod, DetectorOptions, EstimatorOptions, IncludedAngle};
 
     #[test]
     fn places_along_an_epipolar_line_are_a_step_apart_and_reach_from_near_to_far() {
@@ -221,8 +221,11 @@ mod tests {
         let lens = Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap();
         let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
         let upright = |method: &str, angle: IncludedAngle| {
-            let detector =
-                CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
+            let mut own = DetectorOptions::for_method(method).unwrap();
+            if let CornerMethod::General(general) = &mut own.method {
+                general.gamma_rad = angle.gamma_rad;
+            }
+            let detector = CornerDetector::new(camera.clone(), own, None).unwrap();
             let options = EstimatorOptions { down: Some(Vector3::x()), angle, ..EstimatorOptions::default() };
             CornerPoseEstimator::new(detector, None, options).unwrap().upright(Matrix3::identity())
         };
