@@ -13,6 +13,7 @@ mod link;
 mod motion_residual;
 mod pose_elimination;
 mod problem;
+mod random_signs;
 mod scatter;
 mod schur;
 
@@ -24,4 +25,5 @@ pub(super) use self::jackknife::DoubtedParts;
 pub(super) use self::keyframe::{Keyframe, Observation};
 pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS, UNKNOWN_LOG_SIGMA};
 pub(super) use self::problem::BundleProblem;
+pub(super) use self::random_signs::RandomSigns;
 pub(super) use self::schur::ReducedSystem;

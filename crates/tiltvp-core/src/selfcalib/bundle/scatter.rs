@@ -2,6 +2,7 @@
 
 use super::keyframe::Observation;
 use super::problem::BundleProblem;
+use super::random_signs::RandomSigns;
 
 /// Bearings from which on the scatter of a landmark is estimated. The logarithm of a scatter from twelve bearings has a standard
 /// deviation of `sqrt(0.79 / 10) = 0.28`, about as much as landmarks of rendered halls differ.
@@ -76,14 +77,9 @@ impl BundleProblem {
     /// and the residuals tell how much was absorbed (Hutchinson's estimate of a trace, 1990).
     fn redundancy(&self) -> f64 {
         let mut moved = self.clone();
-        let mut signs = Vec::new();
-        // Marsaglia's xorshift64 (2003) with a fixed seed: the same signs at every call and on every machine.
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let (mut random, mut signs) = (RandomSigns::new(), Vec::new());
         for observation in moved.keyframes.iter_mut().flat_map(|keyframe| &mut keyframe.observations) {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            let sign = if state >> 63 == 0 { 1.0 } else { -1.0 };
+            let sign = random.next();
             let by = sign * PERTURBATION * self.bearing_sigma * self.scatters[observation.landmark];
             *observation = Observation::new(observation.landmark, observation.bearing + by);
             signs.push(sign);

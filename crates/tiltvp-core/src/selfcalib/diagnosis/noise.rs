@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::selfcalib::bundle::{BundleProblem, Observation};
+use crate::selfcalib::bundle::{BundleProblem, Observation, RandomSigns};
 use crate::selfcalib::model::{OUTLIER_SIGMAS, between};
 
 /// Random probes of the redundancies: their error is then some 10 % where fifty motions are redundant.
@@ -57,7 +57,7 @@ impl BundleProblem {
         let before = (self.residuals(), self.motion_residuals());
         let used: Vec<bool> = before.0.iter().map(|r| r.abs() <= OUTLIER_SIGMAS).collect();
         let counted: Vec<bool> = before.1.iter().map(|r| r.norm_squared() <= MOST_SQUARED).collect();
-        let mut signs = Signs(0x9e37_79b9_7f4a_7c15);
+        let mut signs = RandomSigns::new();
         for _ in 0..PROBES {
             let Some((one, other)) = self.probe(&before, (&used, &counted), &mut signs) else {
                 return NoiseFactors::ONE;
@@ -107,7 +107,7 @@ impl BundleProblem {
         &self,
         before: &(Vec<f64>, Vec<Vector3<f64>>),
         counts: (&[bool], &[bool]),
-        signs: &mut Signs,
+        signs: &mut RandomSigns,
     ) -> Option<(f64, f64)> {
         let mut moved = self.clone();
         let (mut of_bearings, mut of_motions) = (Vec::new(), Vec::new());
@@ -162,16 +162,4 @@ fn significant(factor: f64, redundancy: f64) -> f64 {
 /// `W` such that `W^T W` is the information.
 fn whitening(information: &Matrix3<f64>) -> Matrix3<f64> {
     information.cholesky().map_or_else(Matrix3::zeros, |factor| factor.l().transpose())
-}
-
-/// Marsaglia's xorshift64 (2003) with a fixed seed: the same signs at every call and on every machine.
-struct Signs(u64);
-
-impl Signs {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        if self.0 >> 63 == 0 { 1.0 } else { -1.0 }
-    }
 }
