@@ -1,6 +1,6 @@
 //! One ray of a corner: the great circle of an edge's image, fitted, and the side of the vertex on which it lies.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 
 use crate::camera::Camera;
 use crate::filter::{restored, symmetric};
@@ -91,6 +91,19 @@ impl FittedRay {
         (self.covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).try_inverse()
     }
 
+    /// How far a plane is from the ray's, by a normal of any length and by the ray's [`information`](Self::information).
+    pub(super) fn missed_by(&self, plane: &Vector3<f64>, information: &Matrix2<f64>) -> PlaneMiss {
+        let length = plane.norm();
+        let normal = plane / length;
+        let across = tangent_basis(&self.normal).transpose();
+        let basis = across / length;
+        let by_plane = basis - basis * normal * normal.transpose();
+        let miss = across * normal;
+        let is_near = normal.dot(&self.normal) > 0.0;
+        let chi_square = if is_near { miss.dot(&(information * miss)) } else { f64::INFINITY };
+        PlaneMiss { miss, by_plane, chi_square }
+    }
+
     /// Whether every number is finite, the bearings of unit length and the variances not negative nor above 1e150.
     pub fn is_valid(&self) -> bool {
         let unit = |v: &Vector3<f64>| (v.norm_squared() - 1.0).abs() < 1e-6;
@@ -106,6 +119,16 @@ impl FittedRay {
             && unit(&self.normal)
             && unit(&self.toward)
     }
+}
+
+/// How far a plane through the camera is from that of a ray.
+pub(super) struct PlaneMiss {
+    /// In the tangent plane at the ray's normal.
+    pub(super) miss: Vector2<f64>,
+    /// The derivative by the plane's normal, as long as it was given.
+    pub(super) by_plane: Matrix2x3<f64>,
+    /// Its square in standard deviations of the ray; infinite on the other half of the ray's circle.
+    pub(super) chi_square: f64,
 }
 
 #[cfg(test)]

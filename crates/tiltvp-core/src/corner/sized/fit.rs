@@ -5,8 +5,7 @@ use nalgebra::{Cholesky, Matrix2, Matrix3, Matrix6, Rotation3, SMatrix, SVector,
 use super::far_edges::SeenEnd;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::feature::CornerFeature;
-use crate::corner::ray::FittedRay;
-use crate::geometry::tangent_basis;
+use crate::corner::ray::{FittedRay, PlaneMiss};
 
 /// Rotation vector, vertex, included angle, and the three lengths.
 const UNKNOWNS: usize = 10;
@@ -197,12 +196,7 @@ impl System {
         // From the vertex to where the line begins.
         let begins = line.end_of.and_then(|end| Some(edges[end] * state.lengths[end]?)).unwrap_or_default();
         let point = state.vertex + begins;
-        let plane = point.cross(&edge);
-        let length = plane.norm();
-        let normal = plane / length;
-        // Against the plane measured: 2 x 3 of a small change of `plane`.
-        let basis = tangent_basis(&line.ray.normal).transpose() / length;
-        let by_plane: SMatrix<f64, 2, 3> = basis - basis * normal * normal.transpose();
+        let PlaneMiss { miss, by_plane, chi_square } = line.ray.missed_by(&point.cross(&edge), &line.weight);
         let mut plane_by = SMatrix::<f64, 3, UNKNOWNS>::zeros();
         let turned = edge.cross_matrix() * begins.cross_matrix() - point.cross_matrix() * edge.cross_matrix();
         plane_by.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
@@ -219,13 +213,10 @@ impl System {
         }
         plane_by.column_mut(GAMMA).copy_from(&opened);
         let by = by_plane * plane_by;
-        let miss = tangent_basis(&line.ray.normal).transpose() * normal;
         let weighted = by.transpose() * line.weight;
         self.information += weighted * by;
         self.pull += weighted * miss;
-        // On the other half of its circle a line misses by as much as can be.
-        self.chi_square +=
-            if normal.dot(&line.ray.normal) > 0.0 { miss.dot(&(line.weight * miss)) } else { f64::INFINITY };
+        self.chi_square += chi_square;
     }
 
     /// Adds what is known of angle and lengths, and says which unknowns are free.
