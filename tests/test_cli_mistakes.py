@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import io
+import itertools
+import re
 import sys
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 
 import pytest
+from cyclopts.validators import Number
 
 import tiltvp
 from command_inputs import write_drive_log
-from commands import Run
+from commands import Run, verbs
+from tiltvp.cli.app import app
+from tiltvp.lab.datasets.new import in_order
 
 
 @pytest.fixture
@@ -52,6 +58,15 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
          "left-wheel-negated, right-wheel-negated, clockwise, degrees, millimetres, cumulative"),
         ("dataset drive --out d --legs 2.3", "--legs '2.3', expected METRES,DEGREES"),
         ("demo --alpha-deg 400", 'Invalid value "400.0" for --alpha-deg. Must be <= 180. Try `tiltvp demo --help`.'),
+        ("dataset synth --out d --rooms 99999999999999999999",
+         'Invalid value "99999999999999999999" for --rooms. Must be <= 1000000. Try `tiltvp dataset synth --help`.'),
+        ("measure corners --poses 0 --frames 0 --noisy-poses 9223372036854775808",
+         'Invalid value "9223372036854775808" for --noisy-poses. Must be <= 1000000. Try `tiltvp measure corners '
+         "--help`."),
+        ("demo --seed 18446744073709551616",
+         'Invalid value "18446744073709551616" for --seed. Must be <= 18446744073709551615. Try `tiltvp demo --help`.'),
+        ("tilt x.png --camera camera.toml --threads 1000000",
+         'Invalid value "1000000" for --threads. Must be <= 1024. Try `tiltvp tilt --help`.'),
         ("demo --page p.html --out d", "--out d beside --page p.html, expected one of them"),
     ],
 )  # fmt: skip
@@ -73,3 +88,19 @@ def test_a_stream_without_frames_is_wrong_use(
     said = run(*verb.split(), "-", "--camera", "camera.toml", "--out", out, *words)
     assert (said.code, said.out, (folder / out).exists()) == (2, "", False)
     assert said.complaint == "tiltvp: -: no frames came, expected one or more\n"
+
+
+@pytest.mark.parametrize("verb", sorted(verbs(app)), ids=" ".join)
+def test_counts_have_an_end(verb: tuple[str, ...]) -> None:
+    for one in app.parse_commands(verb)[1][-1].assemble_argument_collection():
+        for validator in one.parameter.validator if one.parse else ():
+            if "int" in re.findall(r"\w+", str(one.hint)) and isinstance(validator, Number):
+                assert validator.lte is not None, one.name
+
+
+def test_of_many_jobs_a_few_are_begun() -> None:
+    """All were: a count of 10^9 filled the memory before the first was done."""
+    begun: list[int] = []
+    with in_order(begun.append, itertools.count(), 2, Event()) as done:
+        list(itertools.islice(done, 10))
+    assert len(begun) < 100

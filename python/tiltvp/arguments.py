@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from types import UnionType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "THREADS_MAX",
     "array_from",
     "each_from",
     "flag_from",
@@ -30,6 +31,9 @@ __all__ = [
     "texts_from",
     "two_from",
 ]
+
+THREADS_MAX: Final = 1024
+"""At the same time: more than machines have cores, and fewer than a system refuses."""
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.frame_checks import tell_setup_of
-from tiltvp.cli.options import CameraOptions, Switch, given_words
+from tiltvp.cli.options import CameraOptions, Switch, at_least, given_words
 from tiltvp.cli.sources import KeptOptions, MotionOptions, ending_at_interrupt
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
@@ -43,7 +43,7 @@ class PictureOptions:
 
     topic: str | None = None
     """The topic of a recording's images, where it has several."""
-    track_frames_min: Annotated[Whole, Parameter(validator=validators.Number(gte=2))] = 3
+    track_frames_min: Annotated[Whole, at_least(2)] = 3
     """A line counts if it is seen in so many images."""
     tracks: Path | None = None
     """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""

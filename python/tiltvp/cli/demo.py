@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import Whole
+from tiltvp.cli.options import Seed
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
@@ -61,7 +62,7 @@ def demo(
     *,
     out: Path | None = None,
     page: Path | None = None,
-    seed: Whole = 8,
+    seed: Seed = 8,
     alpha_deg: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=180))] = 4.0,
     beta_deg: float = 30.0,
     kind: str = "office",

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import METHODS
+from tiltvp.arguments import THREADS_MAX
 from tiltvp.cli.declared_options import LibraryOptions, Whole, from_library
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_mask
@@ -31,10 +32,19 @@ M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
 ABOVE_0 = Parameter(validator=validators.Number(gt=0))
-AtLeast0 = Annotated[Whole, Parameter(validator=validators.Number(gte=0))]
-AtLeast1 = Annotated[Whole, Parameter(validator=validators.Number(gte=1))]
+
+
+def at_least(least: int) -> Parameter:
+    """A number of things: up to a million, of which a list is some hundred megabytes, and making them takes days."""
+    return Parameter(validator=validators.Number(gte=least, lte=1_000_000))
+
+
+AtLeast0 = Annotated[Whole, at_least(0)]
+AtLeast1 = Annotated[Whole, at_least(1)]
+Seed = Annotated[Whole, Parameter(validator=validators.Number(gte=0, lte=2**64 - 1))]
 ALL_CORES = os.cpu_count() or 1
-Threads = Annotated[AtLeast1, Parameter(help="How many at the same time; all cores by default.", show_default=False)]
+ThreadCount = Annotated[Whole, Parameter(validator=validators.Number(gte=1, lte=THREADS_MAX))]
+Threads = Annotated[ThreadCount, Parameter(help="How many at the same time; all cores by default.", show_default=False)]
 
 
 _PANORAMA = "equirectangular:"

@@ -14,7 +14,7 @@ from tiltvp.cli.answers import check_answers, check_stamps, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.frame_checks import tell_setup
-from tiltvp.cli.options import AtLeast1, CameraOptions, FrameRate, MethodOptions
+from tiltvp.cli.options import CameraOptions, FrameRate, MethodOptions, ThreadCount
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import (
@@ -63,7 +63,7 @@ def tilt(
     overlay: Path | None = None,
     level: Path | None = None,
     frame_rate: FrameRate = None,
-    threads: AtLeast1 = 1,
+    threads: ThreadCount = 1,
     showing: ShowOptions = _SHOWING,
     cluster: str | None = None,
 ) -> int:

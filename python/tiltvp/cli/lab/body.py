@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import AtLeast0
+from tiltvp.cli.options import AtLeast0, Seed
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError, counted
 
@@ -15,7 +15,7 @@ def body(
     /,
     *,
     rooms: AtLeast0 = 1,
-    seed: AtLeast0 = 500,
+    seed: Seed = 500,
 ) -> None:
     """The mask of `body_mask` on rendered drives with a body painted in, and the tilts without it, with it and with it
     left out.

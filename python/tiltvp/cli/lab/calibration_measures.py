@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads, check_word
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads, check_word
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
@@ -99,7 +99,7 @@ def calibration_images(
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
     leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
     trajectory: str = "paper",
-    seed: AtLeast0 = 9101,
+    seed: Seed = 9101,
     threads: Threads = ALL_CORES,
     out: Saved = None,
 ) -> None:
@@ -135,7 +135,7 @@ def calibration_images(
 def trust_calibration(
     *,
     drives: AtLeast1 = 100,
-    seed: AtLeast0 = 100_000,
+    seed: Seed = 100_000,
     only: str = "",
     out: Path | None = None,
 ) -> None:
@@ -178,7 +178,7 @@ def trust_pictures(
     *,
     drives: AtLeast1 = 2,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor", "office", "living-room"),
-    seed: AtLeast0 = 9501,
+    seed: Seed = 9501,
     only: str = "",
     threads: Threads = ALL_CORES,
     out: Saved = None,

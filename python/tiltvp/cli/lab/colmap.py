@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.colmap import BELIEVED_MIN
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import Seed, at_least
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.files import scratch_folder
@@ -21,8 +22,8 @@ _WAYS = 3
 def colmap(
     *,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room"),
-    seed: Whole = 5,
-    views: Annotated[Whole, Parameter(validator=validators.Number(gte=3))] = 24,
+    seed: Seed = 5,
+    views: Annotated[Whole, at_least(3)] = 24,
     out: Saved = None,
 ) -> None:
     """COLMAP on views of rendered rooms: errors of gravity of its reconstructions, without priors and with them.

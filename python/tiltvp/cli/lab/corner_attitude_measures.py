@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from tiltvp.cli.lab.measure_options import Every, PanoramasIfAny
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
@@ -27,7 +27,7 @@ def corner_attitudes(
     ),
     places: AtLeast1 = 24,
     views: AtLeast1 = 8,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     every: Every = 1,
     threads: Threads = ALL_CORES,
     out: Path | None = None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Seed, Threads
 from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -28,7 +28,7 @@ def corners(
     frames: AtLeast0 = 1000,
     scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     rooms: AtLeast0 = 0,
-    seed: AtLeast0 = 7001,
+    seed: Seed = 7001,
     threads: Threads = ALL_CORES,
     out: Path | None = None,
 ) -> None:

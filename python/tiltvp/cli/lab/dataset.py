@@ -9,7 +9,7 @@ from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
 from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
-from tiltvp.cli.options import AtLeast1, Switch
+from tiltvp.cli.options import AtLeast1, Seed, Switch
 from tiltvp.cli.root import group
 from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
 from tiltvp.errors import counted
@@ -64,7 +64,7 @@ def check(directory: Path, /) -> int:
 
 
 @app.command
-def panoramas(*, out: Path, rooms: AtLeast1 = 4, places: AtLeast1 = 2, height: Whole = 640, seed: Whole = 0) -> None:
+def panoramas(*, out: Path, rooms: AtLeast1 = 4, places: AtLeast1 = 2, height: Whole = 640, seed: Seed = 0) -> None:
     """Render upright panoramas of rooms, with the index that folders of panoramas have.
 
     Parameters

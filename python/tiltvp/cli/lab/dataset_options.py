@@ -12,7 +12,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from tiltvp.cli.declared_options import Whole
-from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads, rotation_of
+from tiltvp.cli.options import ALL_CORES, CameraOptions, Seed, Switch, Threads, rotation_of
 from tiltvp.csv_files import LARGEST_CSV_BYTES
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import keeps_existing, read_text
@@ -35,7 +35,7 @@ class MakingOptions:
 
     out: Path
     """Folder to make. It appears when it is whole."""
-    seed: AtLeast0 = 0
+    seed: Seed = 0
     """Seed of whatever is random."""
     threads: Threads = ALL_CORES
     force: Switch = False

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from tiltvp.cli.options import AtLeast0
+from tiltvp.cli.options import Seed
 from tiltvp.cli.root import run
 from tiltvp.cli.terminal import say
 
@@ -24,7 +24,7 @@ _LINES_MAX: Final = 30
 def demo(
     *,
     out: Path = Path("out/demo-drive"),
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     resolution_scale: Annotated[float, Parameter(show=False)] = 1.0,
 ) -> None:
     """Make a recording of a drive, and from it a robot's file, a mounting, a level video and attitudes for ROS.

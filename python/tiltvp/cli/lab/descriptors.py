@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Seed, Threads
 from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -22,7 +22,7 @@ def descriptors(
     out: Path,
     frame: AtLeast0 = 0,
     tracked: AtLeast0 = 240,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     threads: Threads = ALL_CORES,
 ) -> None:
     """How well the descriptor of vertical lines tells them apart, on drives of known edges (sections 5 and 6).

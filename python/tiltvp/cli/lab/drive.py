@@ -9,7 +9,7 @@ from pathlib import Path
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.dataset_options import LensOptions, Mount, RenderingOptions, WayOptions, Words, legs_from
-from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
+from tiltvp.cli.options import ALL_CORES, Seed, Switch, Threads
 from tiltvp.cli.root import group
 from tiltvp.cli.terminal import progress_bar, say
 
@@ -48,7 +48,7 @@ def drive(
     camera_delay_s: float = 0.0,
     compressed: Switch = False,
     rendering: RenderingOptions = _RENDERING,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     threads: Threads = ALL_CORES,
 ) -> None:
     """Make a recording of a robot's drive through a room, as its sensors tell of it: an MCAP file for ROS 2.

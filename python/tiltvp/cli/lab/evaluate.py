@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
+from tiltvp.cli.options import ALL_CORES, Seed, Threads
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.files import refuse_file_name
 
@@ -27,7 +27,7 @@ def evaluate(
     methods: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     threads: Threads = ALL_CORES,
     cluster: str | None = None,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
 ) -> None:
     """Run the methods over a dataset, train the corrections location by location, and print the paper's tables.
 

@@ -5,21 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads, at_least
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 
 
 def lines(
     *,
-    frames: Annotated[Whole, Parameter(validator=validators.Number(gte=2))] = 400,
+    frames: Annotated[Whole, at_least(2)] = 400,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("corridor", "hall"),
     leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 5.0),
-    seed: AtLeast0 = 9001,
+    seed: Seed = 9001,
     samples: AtLeast1 = 2,
     threads: Threads = ALL_CORES,
     out: Path | None = None,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import AtLeast0, AtLeast1
+from tiltvp.cli.options import AtLeast1, Seed
 from tiltvp.cli.terminal import progress_bar
 
 
 def mounting(
     *,
     drives: AtLeast1 = 6,
-    seed: AtLeast0 = 900,
+    seed: Seed = 900,
 ) -> None:
     """What `tiltvp setup` and `calibrate` find on rendered recordings of drives: level and sloping floors, and bumps.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads
 from tiltvp.cli.tables import PICTURES, check_ending, check_file, write_frame
 from tiltvp.cli.terminal import progress_bar
 
@@ -15,7 +15,7 @@ _PAIRS_OF_A_ROOM = 12
 def planar_pose(
     *,
     pairs: AtLeast1 = 180,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     threads: Threads = ALL_CORES,
     out: Path | None = None,
     plot: Path | None = None,

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import AtLeast0, AtLeast1, Switch
+from tiltvp.cli.options import AtLeast0, AtLeast1, Seed, Switch
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -20,7 +20,7 @@ def trust(
     *,
     count: AtLeast1 = 200,
     sets: AtLeast0 = 2,
-    seed: AtLeast0 = 0,
+    seed: Seed = 0,
     unseen: Switch = False,
     weights: Switch = False,
     out: Path | None = None,

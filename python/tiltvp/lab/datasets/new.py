@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 import tomli_w
 
+from tiltvp.arguments import THREADS_MAX
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import refuse_file_name, whole_folder
 from tiltvp.images import write_image
@@ -33,6 +35,8 @@ __all__ = ["NewDataset", "in_order", "new_dataset", "new_folder"]
 
 _CAMERA: Final = "camera.toml"
 _IMAGES: Final = "images"
+_AHEAD: Final = 16
+"""Jobs that are begun for each thread, so that few threads wait while one job takes long."""
 _HEARS_S: Final = 0.2
 """After which a wait looks for Ctrl-C: half of what an interrupt may take."""
 
@@ -114,27 +118,30 @@ def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Ite
 
 @contextmanager
 def in_order(
-    work: Callable[[Job], Result], jobs: Sequence[Job], threads: int, stop: Event
+    work: Callable[[Job], Result], jobs: Iterable[Job], threads: int, stop: Event
 ) -> Iterator[Iterator[Result]]:
-    """`work(job)` of each job, in their order, on several threads.
+    """`work(job)` of each job, in their order, on several threads. Jobs are taken a few at a time: there may be many.
 
     When one fails, or the caller leaves, what has not begun never does, and `stop` is set for what has.
     """
-    if threads < 1:
-        raise InvalidInputError(f"threads = {threads}, expected 1 or more")
-    pool = ThreadPoolExecutor(min(threads, max(1, len(jobs))))
+    if not 1 <= threads <= THREADS_MAX:
+        raise InvalidInputError(f"threads = {threads}, expected 1 to {THREADS_MAX}")
+    pool = ThreadPoolExecutor(threads)
+    begun = (pool.submit(work, job) for job in jobs)
     try:
-        yield _results(deque(pool.submit(work, job) for job in jobs))
+        yield _results(begun, _AHEAD * threads)
     finally:
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _results(waiting: deque[Future[Result]]) -> Iterator[Result]:
+def _results(begun: Iterator[Future[Result]], ahead: int) -> Iterator[Result]:
     """What comes of each, and is not kept. A wait without end hears of no Ctrl-C once Polars, whose handler has waits
     go on, is imported."""
+    waiting = deque(islice(begun, ahead))
     while waiting:
         future = waiting.popleft()
+        waiting.extend(islice(begun, 1))
         while not wait((future,), _HEARS_S).done:
             pass
         yield future.result()
