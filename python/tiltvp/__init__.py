@@ -5,6 +5,9 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 (-sin a cos b, -sin a sin b, cos a) in the robot frame; beta = 0 is a forward lean. Radians and metres.
 """
 
+from tiltvp import _command  # noqa: F401 - before all that takes time
+
+# isort: split
 from typing import TYPE_CHECKING, Any
 
 from tiltvp import lines
