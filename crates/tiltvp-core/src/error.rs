@@ -60,7 +60,7 @@ impl Error {
         value: impl std::fmt::Display,
         expected: impl Into<Cow<'static, str>>,
     ) -> Self {
-        Self::InvalidOption { name: name.into(), value: value.to_string(), expected: expected.into() }
+        Self::InvalidOption { name: name.into(), value: shown(value), expected: expected.into() }
     }
 
     /// The same error where the option is part of others and its name begins with a prefix there.
@@ -76,7 +76,7 @@ impl Error {
 
     /// An [`Error::InvalidArgument`] from any printable values.
     pub fn argument(name: &'static str, got: impl std::fmt::Display, expected: impl std::fmt::Display) -> Self {
-        Self::InvalidArgument { name, got: got.to_string(), expected: expected.to_string() }
+        Self::InvalidArgument { name, got: shown(got), expected: expected.to_string() }
     }
 
     /// An [`Error::InvalidCamera`] from any printable value.
@@ -86,6 +86,31 @@ impl Error {
         value: impl std::fmt::Display,
         expected: impl Into<Cow<'static, str>>,
     ) -> Self {
-        Self::InvalidCamera { model, parameter: parameter.into(), value: value.to_string(), expected: expected.into() }
+        Self::InvalidCamera { model, parameter: parameter.into(), value: shown(value), expected: expected.into() }
+    }
+}
+
+/// What was given as text: a number of more digits than a 64-bit one has, such as 1e300, with its exponent.
+fn shown(given: impl std::fmt::Display) -> String {
+    const MOST: usize = 24;
+    let text = given.to_string();
+    match text.parse::<f64>() {
+        Ok(number) if text.len() > MOST => format!("{number:e}"),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_many_digits_are_shown_with_their_exponent() {
+        for (given, text) in [(1e300, "1e300"), (-1e-300, "-1e-300"), (0.1, "0.1"), (f64::NAN, "NaN")] {
+            let said = Error::option("margin_px", given, "a width").to_string();
+            assert_eq!(said, format!("option margin_px = {text}, expected a width"));
+            assert_eq!(Error::argument("a", given, "b").to_string(), format!("a: got {text}, expected b"));
+        }
+        assert_eq!(shown(u64::MAX), "18446744073709551615");
     }
 }

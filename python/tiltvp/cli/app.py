@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Final
 
-from cyclopts import CycloptsError, MissingArgumentError
+from cyclopts import CycloptsError
 
+from tiltvp.cli.option_words import OPTIONS
+from tiltvp.cli.refusals import options_of, told
 from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
@@ -70,6 +72,7 @@ def run_words(arguments: Sequence[str] | None) -> int:
         if place and not _takes_a_word(words[place - 1], words):
             # A word that begins so is taken for an option, which its name would be looked for among.
             words[place] = STDIN
+    OPTIONS.set(lambda: {name for one in options_of(app, words) for name in one.names})
     try:
         _refuse_empty(words)
         with nullcontext() if overwrite else keeping_existing():
@@ -77,10 +80,7 @@ def run_words(arguments: Sequence[str] | None) -> int:
         sys.stdout.flush()
         return code
     except CycloptsError as error:
-        said = str(error)
-        if isinstance(error, MissingArgumentError) and error.keyword is None:
-            said = said.replace(" requires an argument.", " is not given.")
-        complain(f"{said} Try `{' '.join(('tiltvp', *(error.command_chain or ()), '--help'))}`.")
+        complain(f"{told(error, app, words)} Try `{' '.join(('tiltvp', *(error.command_chain or ()), '--help'))}`.")
         return WRONG_USE
     except (MissingExtraError, OutputError) as error:
         complain(str(error))
@@ -121,9 +121,5 @@ def _takes_a_word(option: str, words: Sequence[str]) -> bool:
     """Whether a word of the line is an option whose value comes next: no name, no switch, and none with its value."""
     if not option.startswith("--") or "=" in option:
         return False
-    names, verbs, _ = app.parse_commands(words)
-    verb = verbs[-1]
-    # Help and version are commands of their own there, and nobody asks for their options.
-    if verb.default_command is None or names[-1].startswith("-"):
-        return True
-    return not any(option in one.names and one.token_count()[0] == 0 for one in verb.assemble_argument_collection())
+    options = options_of(app, words)
+    return not any(option in one.names and one.token_count()[0] == 0 for one in options)

@@ -55,10 +55,10 @@ class DriveOptions(LibraryOptions):
     wheel_base: Annotated[float | None, Parameter(parse=False)] = None
     """Distance between the wheels, metres, as `settled` has it."""
     start: tuple[float, float, float] | None = None
-    """x and y in metres and yaw in radians of the mounting as it is thought to be; by default x and y of a robot's
-    file, or 0 0 0."""
+    """x and y in metres and yaw in radians (90 degrees are 1.571) of the mounting as it is thought to be; by default x
+    and y of a robot's file, or 0 0 0."""
     start_sigma: tuple[float, float, float] | None = None
-    """Their standard deviations."""
+    """Standard deviations of x and y in metres and of yaw in radians."""
     bearing_sigma_deg: float | None = None
     """Standard deviation of a bearing; for images by default the median of what the lines' own are."""
 
@@ -68,9 +68,9 @@ class DriveOptions(LibraryOptions):
         if base is None:
             raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
         for option, given in (("--start", self.start), ("--start-sigma", self.start_sigma)):
-            if given is not None and abs(given[2]) > 2.0 * math.pi:
+            if given is not None and abs(given[2]) > math.pi:
                 degrees = f"{given[2]:g} degrees are {math.radians(given[2]):.4g}"
-                raise InvalidInputError(f"{option}: a yaw of {given[2]:g} radians, expected at most 2 pi; {degrees}")
+                raise InvalidInputError(f"{option}: a yaw of {given[2]:g} radians, expected at most pi; {degrees}")
         place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m
         return replace(self, wheel_base=base, start=self.start or (*place, 0.0))
 

@@ -64,7 +64,7 @@ def demo(
     page: Path | None = None,
     seed: Seed = 8,
     alpha_deg: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=180))] = 4.0,
-    beta_deg: float = 30.0,
+    beta_deg: Annotated[float, Parameter(validator=validators.Number(gte=-360, lte=360))] = 30.0,
     kind: str = "office",
     width: Annotated[Whole, Parameter(show=False)] = 640,
     height: Annotated[Whole, Parameter(show=False)] = 480,

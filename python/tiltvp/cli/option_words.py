@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Collection
+from contextvars import ContextVar
 from typing import Final
 
 _NUMBER: Final = r"(?<![\w.-])-?(?:pi(?:/\d+)?|\d[\d.]*(?:e[+-]?\d+)?)\b"
@@ -15,15 +17,28 @@ _OF_PYTHON: Final = {
 """What is accepted in Python, and on the command line."""
 
 
+OPTIONS: Final[ContextVar[Callable[[], Collection[str]]]] = ContextVar("options", default=tuple)
+"""The names of the options that the command of a line takes."""
+_OTHERWISE: Final = {"blur_sigma_px": "--blur-sigma", "bumps_max_rad": "--bumps-deg", "factor": "--resolution-scale"}
+"""Options of commands that the library has under other names."""
+
+
 def of_option(problem: str) -> str:
     """What is wrong with an option or argument of the library as it is typed; else as it is."""
-    head = r"(?:option (?:view\.)?|(?=field_of_view_rad\b)|(?=(\w+): got ))"
+    head = r"(?:option (?:view\.|stereo\.)?|(?=field_of_view_rad\b)|(?=(\w+)(?:: got | = )))"
     found = re.match(head + r"(\w+)(?:, (\w+))?(?: = (\[[^]]*\]|[^ ,]+),)?(?=[ :])", problem)
     if found is None:
         return problem
     from tiltvp.cli.declared_options import KEYWORDS, flag_of, is_angle
 
-    if found[1] not in (None, *KEYWORDS):
+    taken = OPTIONS.get()()
+
+    def called(keyword: str) -> str:
+        flag, other = flag_of(keyword), _OTHERWISE.get(keyword, "")
+        return other if flag not in taken and other in taken else flag
+
+    known = KEYWORDS if f"{found[1]}: got " in problem else ()
+    if found[1] is not None and found[1] not in known and called(found[1]) not in taken:
         return problem
     (_, keyword, second, value), rest = found.groups(), problem[found.end() :]
     told = "" if value is None else f" = {value},"
@@ -37,7 +52,7 @@ def of_option(problem: str) -> str:
     before, listed, names = rest.partition(", expected one of ")
     if before.startswith(": unknown"):
         names = ", ".join(map(flag_of, names.split(", ")))
-    flags = ", ".join(map(flag_of, filter(None, (keyword, second))))
+    flags = ", ".join(map(called, filter(None, (keyword, second))))
     return f"{flags}{told}{typed(before + listed + names)}"
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
+
+from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.dataset_options import (
@@ -87,7 +90,7 @@ def stereo(
     gamma_deg: float = 90.0,
     corner: Whole | None = None,
     clutter: float | None = None,
-    exposure_ms: float = 0.0,
+    exposure_ms: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=100))] = 0.0,
     blur_sigma: float | None = None,
     rendering: RenderingOptions = _RENDERING,
 ) -> None:

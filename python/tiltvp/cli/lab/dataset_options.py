@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import ALL_CORES, CameraOptions, Seed, Switch, Threads, rotation_of
@@ -122,7 +122,7 @@ class DriveLensOptions(LensOptions):
         return MIRROR_BLIND_RAD if str(self.camera) == "mirror" else None
 
 
-Mount = tuple[float, float, float, float]
+Mount = Annotated[tuple[float, float, float, float], Parameter(validator=validators.Number(gte=-360, lte=360))]
 
 
 @Parameter(name="*")
