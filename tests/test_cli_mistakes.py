@@ -5,11 +5,14 @@ from __future__ import annotations
 import io
 import itertools
 import re
+import subprocess
 import sys
 from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
 
+import cv2
+import numpy as np
 import pytest
 from cyclopts.validators import Number
 
@@ -122,3 +125,18 @@ def test_of_many_jobs_a_few_are_begun() -> None:
     with in_order(begun.append, itertools.count(), 2, Event()) as done:
         list(itertools.islice(done, 10))
     assert len(begun) < 100
+
+
+def test_of_damaged_images_our_lines_stand_alone(tmp_path: Path) -> None:
+    """Decoders write to stderr, past Python, and without the name of the file."""
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64), dtype=np.uint8)
+    for ending in (".png", ".tif", ".bmp", ".jp2", ".jpg"):
+        data = cv2.imencode(ending, noise)[1].tobytes()
+        (tmp_path / f"cut{ending}").write_bytes(data[: len(data) // 2])
+    files = sorted(str(file) for file in tmp_path.iterdir())
+    command = [sys.executable, "-m", "tiltvp", "camera", "rim", *files]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert [line.partition(" (")[0] for line in done.stderr.splitlines()] == [
+        f"tiltvp: {file}: not an image that can be decoded" for file in files
+    ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp.arguments import path_from, refuse_unless
+from tiltvp.decoder_words import quietly
 from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
 from tiltvp.files import read_bytes, write_whole
 from tiltvp.image_headers import file_size, header_size, unturned
@@ -284,9 +285,10 @@ def _header_of(data: bytes, name: str) -> tuple[int, int]:
 def _decode(data: bytes) -> NDArray[Any] | None:
     import cv2
 
+    depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
-        depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-        return cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), depths)
+        with quietly():
+            return cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), depths)
     except (cv2.error, MemoryError):
         return None
 
@@ -295,7 +297,8 @@ def decode_as_stored(data: bytes) -> NDArray[Any]:
     """What `decode_image` takes, with its depth and opacity: (H, W) or (H, W, 3 or 4) uint8 or uint16, BGR or BGRA."""
     import cv2
 
-    return np.asarray(cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), cv2.IMREAD_UNCHANGED))
+    with quietly():
+        return np.asarray(cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), cv2.IMREAD_UNCHANGED))
 
 
 def is_as_stored(data: bytes) -> bool:

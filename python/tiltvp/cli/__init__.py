@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tiltvp.cli.terminal import complain
+from tiltvp.cli.terminal import apart_from_decoders, complain
 
 __all__ = ["main"]
 
@@ -21,7 +21,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Within, for it takes most of the time until a command begins, and Ctrl-C may come before that.
         from tiltvp.cli.app import run_words
 
-        return run_words(arguments)
+        with apart_from_decoders():
+            return run_words(arguments)
     except KeyboardInterrupt:
         complain("interrupted")
         return _INTERRUPTED

@@ -11,6 +11,8 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Final
 
+from tiltvp.decoder_words import left_out
+
 if TYPE_CHECKING:
     from rich.progress import Progress
     from rich.table import Table
@@ -39,6 +41,27 @@ def print_any_name() -> None:
     """Names of files that are no UTF-8 are printed on stdout as on stderr, with `\\udcff` for a byte 0xff."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def apart_from_decoders() -> Iterator[None]:
+    """Our lines are all that stderr has of images that are damaged: we write to a duplicate of it, and decoders, to
+    nowhere."""
+    try:
+        ours = sys.stderr if sys.stderr.fileno() == 2 else None
+    except (AttributeError, OSError, ValueError):
+        ours = None
+    if ours is None:
+        yield
+        return
+    duplicate = os.dup(2)
+    sys.stderr = open(duplicate, "w", 1, ours.encoding, ours.errors, closefd=False)  # noqa: SIM115
+    try:
+        with left_out(duplicate):
+            yield
+    finally:
+        sys.stderr.flush()
+        sys.stderr = ours
 
 
 @contextmanager
