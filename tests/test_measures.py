@@ -114,8 +114,8 @@ def panoramas(tmp_path: Path) -> Path:
         (["views", "PANORAMAS"], "panoramas of one building"),
         (["trust", "PANORAMAS", "--unseen", "--weights"], "expected one of them"),
         (["trust", "PANORAMAS", "--weights"], "no building of the half"),
-        (["panoramas", "PANORAMAS", "--noise-sigma", "-1"], "noise_sigma = -1"),
-        (["panoramas", "PANORAMAS", "--noise-sigma", "nan"], "noise_sigma = nan"),
+        (["panoramas", "PANORAMAS", "--noise-sigma", "-1"], "--noise-sigma = -1"),
+        (["panoramas", "PANORAMAS", "--noise-sigma", "nan"], "--noise-sigma = nan"),
     ],
     ids=lambda value: " ".join(value)[:40] if isinstance(value, list) else None,
 )  # fmt: skip

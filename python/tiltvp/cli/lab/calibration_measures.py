@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tiltvp.cli.lab.measure_options import Saved
+from tiltvp.cli.lab.measure_options import LeansDeg, Saved
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads, check_word
 from tiltvp.cli.tables import check_ending, write_frame
@@ -97,7 +97,7 @@ def calibration_images(
     *,
     drives: AtLeast1 = 2,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
-    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
+    leans_deg: LeansDeg = (0.0, 3.0),
     trajectory: str = "paper",
     seed: Seed = 9101,
     threads: Threads = ALL_CORES,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tiltvp.cli.lab.measure_options import Every, PanoramasIfAny
+from tiltvp.cli.lab.measure_options import Every, PanoramasIfAny, refuse_every
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads
 from tiltvp.cli.tables import check_ending, write_frame
@@ -61,6 +61,7 @@ def corner_attitudes(
     from tiltvp.synth import OUTDOOR_KINDS, ROOM_KINDS
 
     check_ending(out)
+    refuse_every(directory, every, 1)
     known = (*OUTDOOR_KINDS, *ROOM_KINDS)
     for kind in kinds:
         if kind not in known:

@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.declared_options import Whole
+from tiltvp.cli.lab.measure_options import LeansDeg
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast1, Seed, Threads, at_least
 from tiltvp.cli.tables import check_ending, write_frame
@@ -18,7 +19,7 @@ def lines(
     *,
     frames: Annotated[Whole, at_least(2)] = 400,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("corridor", "hall"),
-    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 5.0),
+    leans_deg: LeansDeg = (0.0, 5.0),
     seed: Seed = 9001,
     samples: AtLeast1 = 2,
     threads: Threads = ALL_CORES,

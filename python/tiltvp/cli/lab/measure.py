@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.body import body
@@ -18,7 +18,16 @@ from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.evaluate import determined_errors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
-from tiltvp.cli.lab.measure_options import Every, NoiseSigma, Panoramas, PanoramasIfAny, Rooms, Samples, Saved
+from tiltvp.cli.lab.measure_options import (
+    Every,
+    NoiseSigma,
+    Panoramas,
+    PanoramasIfAny,
+    Rooms,
+    Samples,
+    Saved,
+    refuse_every,
+)
 from tiltvp.cli.lab.mounting import mounting
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
@@ -94,7 +103,7 @@ def views(
     *,
     every: Every = 1,
     weights: Switch = False,
-    prior_deg: float = 15.0,
+    prior_deg: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=180))] = 15.0,
     out: Saved = None,
 ) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
@@ -256,6 +265,9 @@ def sampling(
     from tiltvp.synth import ROOM_KINDS
 
     check_ending(out)
+    refuse_every(directory, every, 4)
+    if kind is not None and rooms == 0:
+        raise InvalidInputError(f"--kind {kind} with --rooms 0, expected rooms")
     camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)
     tables = []
     for source in view_sources(

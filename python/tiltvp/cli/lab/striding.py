@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tiltvp.cli.lab.measure_options import Every, PanoramasIfAny, Rooms
+from tiltvp.cli.lab.measure_options import Every, PanoramasIfAny, Rooms, refuse_every
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
@@ -32,6 +32,7 @@ def striding(
     from tiltvp.lab.evaluation.views import view_sources
 
     check_ending(out)
+    refuse_every(directory, every, 1)
     camera, tables = paper_camera(), []
     for source in view_sources(directory, camera, every=every, rooms=rooms):
         with progress_bar(source.count, source.title) as bar:
