@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tiltvp.cli.terminal import apart_from_decoders, complain
+from tiltvp.cli.terminal import apart_from_decoders, complain, open_closed_streams
 
 __all__ = ["main"]
 
@@ -18,6 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 done, 1 some failed, an extra is missing or an output cannot be written, 2 wrong use, 130 interrupted.
     """
     try:
+        open_closed_streams()
         # Within, for it takes most of the time until a command begins, and Ctrl-C may come before that.
         from tiltvp.cli.app import run_words
 

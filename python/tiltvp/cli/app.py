@@ -17,7 +17,7 @@ from tiltvp.cli.refusals import options_of, told
 from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
-from tiltvp.cli.terminal import complain, open_closed_streams, print_any_name
+from tiltvp.cli.terminal import complain, print_any_name
 from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
 
@@ -53,7 +53,6 @@ for _name, _place in _VERBS.items():
 
 def run_words(arguments: Sequence[str] | None) -> int:
     """Runs the words of a command line, by default those of the process, and gives the exit code."""
-    open_closed_streams()
     print_any_name()
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words
