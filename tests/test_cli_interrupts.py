@@ -99,7 +99,7 @@ def test_an_interrupt_before_a_command_begins_is_told_in_a_line(tmp_path: Path) 
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "tiltvp: interrupted\n")
 
 
-@pytest.mark.parametrize("words", [("-m", "tiltvp"), ("tiltvp",), ("program.py",)])
+@pytest.mark.parametrize("words", [("-m", "tiltvp"), ("tiltvp",), ("program.py",), ("-m", "other", "tiltvp")])
 def test_an_interrupt_while_the_package_is_imported(words: tuple[str, ...], tmp_path: Path) -> None:
     """The command's is told in a line; a program that uses the package hears of its own."""
     (tmp_path / "numpy").mkdir()
@@ -107,11 +107,13 @@ def test_an_interrupt_while_the_package_is_imported(words: tuple[str, ...], tmp_
     (tmp_path / "numpy" / "__init__.py").write_text(interrupt)
     for name in ("tiltvp", "program.py"):
         (tmp_path / name).write_text("import sys\nfrom tiltvp.cli import main\nsys.exit(main())\n")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "__init__.py").write_text("import tiltvp\n")
     path = os.pathsep.join((str(tmp_path), str(Path(tiltvp.__file__).parents[1])))
     done = subprocess.run(
         [sys.executable, *words], cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True
     )
-    if words == ("program.py",):
+    if words in {("program.py",), ("-m", "other", "tiltvp")}:
         assert "Traceback" in done.stderr
     else:
         assert (done.returncode, done.stdout, done.stderr) == (130, "", "tiltvp: interrupted\n")

@@ -17,7 +17,8 @@ def _end(kind: type[BaseException], error: BaseException, trace: TracebackType |
 def _is_run() -> bool:
     """Whether this process is `tiltvp` or `python -m tiltvp`, whose first word is -m until the package is there."""
     name = os.path.basename(sys.argv[0]) if getattr(sys, "argv", None) else ""
-    return name.removesuffix(".exe") == "tiltvp" or (name == "-m" and "tiltvp" in sys.orig_argv)
+    is_module = ("-m", "tiltvp") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
+    return name.removesuffix(".exe") == "tiltvp" or (name == "-m" and is_module)
 
 
 if _is_run():
