@@ -23,18 +23,17 @@ pub(super) fn askew(lines: &[StraightEdge], common: &CommonAttitude) -> Matrix3<
         let turn_axis = rotation.column(about);
         let (mut along, mut turns) = (0.0, Vec::new());
         for line in lines {
-            let off = rotation.tr_mul(&line.normal);
-            let axis = off.abs().imin();
+            let (axis, miss) = line.missed(rotation);
             if axis == about {
                 continue;
             }
-            if off[axis].abs() <= ALONG_SIGMAS * line.sigma_rad * common.scatter {
+            if miss.abs() <= ALONG_SIGMAS * line.sigma_rad * common.scatter {
                 along += 1.0;
                 continue;
             }
             // Turning the axis a about b by t changes normal . a by t normal . (b x a); the sense of all turns does not matter.
             let by_turn = line.normal.dot(&turn_axis.cross(&rotation.column(axis)));
-            let turn_rad = off[axis] / by_turn;
+            let turn_rad = miss / by_turn;
             if turn_rad.abs() <= REACH_SINE {
                 turns.push((turn_rad, line.sigma_rad / by_turn.abs()));
             }

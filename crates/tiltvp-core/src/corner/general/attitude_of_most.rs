@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::askew::askew;
-use super::common_attitude::{CommonAttitude, StraightEdge, common_attitude};
+use super::common_attitude::{CommonAttitude, REACH_SINE, StraightEdge, common_attitude};
 use super::manhattan::{manhattan, manhattan_about};
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
@@ -25,7 +25,7 @@ pub(crate) struct Starts {
 
 /// The attitude that most lines have in common; where most have none, that near the first of `starts`, which may be turned against most
 /// of the room. That of a lone corner is held against the others in any case. Beside them one is found by lines alone, upright near
-/// `down`, else as the first start is.
+/// `down`, else as the first start is; lines that run along the axes of the other one tell nothing.
 pub(crate) fn attitude_of_most(
     lines: &[StraightEdge],
     starts: &Starts,
@@ -42,18 +42,34 @@ fn most_common(
     down: Option<Vector3<f64>>,
 ) -> Option<CommonAttitude> {
     let of_first = attitudes.first().and_then(|start| common_attitude(lines, start));
-    let most = MOST * lines.len() as f64;
-    let of_corners = of_first.as_ref().map_or(0.0, |first| first.support);
-    if !lone && of_corners >= most {
-        return of_first;
-    }
     let down = down.or(attitudes.first().map(|start| start.column(1).into_owned()))?;
     let others = attitudes.iter().skip(1).copied().chain(manhattan(lines, &down));
-    let found = others.filter_map(|start| common_attitude(lines, &start));
+    let is_of_most = |common: &CommonAttitude| common.support >= MOST * lines.len() as f64;
+    let found = others.filter_map(|start| common_attitude(lines, &start)).filter(is_of_most);
     let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
+    let (Some(first), Some(other)) = (of_first, best) else { return of_first.or(best) };
+    let agreed = !lone && is_of_most(&first);
     // A count scatters by its root: with less than that more, the corners' own one is as good.
-    let better = |other: &CommonAttitude| other.support >= most && other.support - of_corners > other.support.sqrt();
-    best.filter(better).or(of_first)
+    let is_better = other.support - first.support > other.support.sqrt();
+    let (common, rival) = if is_better && !agreed { (other, first) } else { (first, other) };
+    Some(if is_of_most(&rival) { by_own_lines(lines, &common, &rival) } else { common })
+}
+
+/// An attitude without the lines that run along another axis of a rival: a wall's edges may pass within a degree or two of the axis of a
+/// cuboid that stands turned before it.
+fn by_own_lines(lines: &[StraightEdge], common: &CommonAttitude, rival: &CommonAttitude) -> CommonAttitude {
+    let nearest = |line: &StraightEdge, attitude: &Matrix3<f64>| {
+        let (axis, miss) = line.missed(attitude);
+        (attitude.column(axis).into_owned(), miss.abs())
+    };
+    let is_own = |line: &&StraightEdge| {
+        let (own, miss) = nearest(line, &common.camera_from_object);
+        let (others, others_miss) = nearest(line, &rival.camera_from_object);
+        miss <= others_miss || own.cross(&others).norm() <= REACH_SINE
+    };
+    let own: Vec<StraightEdge> = lines.iter().filter(is_own).copied().collect();
+    let refined = common_attitude(&own, &common.camera_from_object);
+    refined.map_or(*common, |refined| CommonAttitude { support: common.support, ..refined })
 }
 
 /// The attitude of what stands upright beside most, turned about the second axis of their `attitude`: that which most lines have in common
@@ -90,6 +106,25 @@ mod tests {
         assert_eq!(found(12, 17, false), [true, false]);
         assert_eq!(found(6, 40, false), [false, true]);
         assert!(attitude_of_most(&lines(&own, 12, &[0.0]), &Starts::default(), None).is_none());
+    }
+
+    #[test]
+    fn edges_of_walls_do_not_turn_the_cuboid_before_them() {
+        let own = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
+        let walls = own * Rotation3::from_axis_angle(&Vector3::y_axis(), 0.8).matrix();
+        // Edges of a wall near the horizon, whose plane passes within a degree of the cuboid's axis.
+        let near = |k: u32| {
+            let rise = (0.005 + 0.001 * f64::from(k)) / 0.8_f64.sin();
+            let normal = walls.column(1) * rise.cos() + walls.column(2) * rise.sin();
+            StraightEdge { normal, sigma_rad: 0.002, length_px: 200.0 }
+        };
+        let (cuboid, wall) = (lines(&own, 12, &[0.001, -0.001]), lines(&walls, 10, &[0.001, -0.001]));
+        let all = [cuboid, wall, (0..8).map(near).collect()].concat();
+        let off_rad = |found: &CommonAttitude| off_in_any_naming_rad(&found.camera_from_object, &own);
+        let by_all = off_rad(&common_attitude(&all, &own).unwrap());
+        let starts = Starts { attitudes: vec![own], lone: false };
+        let found = off_rad(&attitude_of_most(&all, &starts, None).unwrap());
+        assert!(found < 0.5 * by_all, "{found} {by_all}");
     }
 
     #[test]

@@ -20,8 +20,13 @@ const START_SIGMA_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// How far from the direction of its axis an edge may pass at first: the sine of 2 degrees.
 pub(super) const REACH_SINE: f64 = 0.0349;
 
-/// Edges that miss their axis by this many standard deviations count half (Cauchy weights; 2.4 has 95 % efficiency).
+/// Edges that miss their axis by this many standard deviations count half (Cauchy weights; 2.4 has 95 % efficiency), and
+/// in the end a quarter.
 pub(super) const HALF_SIGMAS: f64 = 2.0;
+
+/// How far edges miss their axes at least, in the standard deviations that they should have: a tenth of a pixel at either
+/// end, as those of a rendered cuboid do.
+const SCATTER_MIN: f64 = 1.0 / 3.0;
 
 /// Least length of a segment, in pixels: shorter ones are off by more than half a degree and add only other things'
 /// edges.
@@ -58,9 +63,16 @@ impl StraightEdge {
         })
     }
 
+    /// The axis of an attitude that it misses least, and the sine of the angle by which it does.
+    pub(super) fn missed(&self, attitude: &Matrix3<f64>) -> (usize, f64) {
+        let off = attitude.tr_mul(&self.normal);
+        let axis = off.abs().imin();
+        (axis, off[axis])
+    }
+
     /// Whether it may be the image of an edge along an axis of an attitude.
     pub(crate) fn runs_along(&self, attitude: &Matrix3<f64>) -> bool {
-        attitude.tr_mul(&self.normal).abs().min() <= REACH_SINE
+        self.missed(attitude).1.abs() <= REACH_SINE
     }
 }
 
@@ -104,11 +116,16 @@ pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> O
     for step in 0..=STEPS {
         let mut information = Matrix3::from_diagonal_element(START_SIGMA_RAD.powi(-2));
         let mut pull = rotation_from(start, &rotation) * START_SIGMA_RAD.powi(-2);
+        // Cauchy's weights find the attitude from afar; squared, as of Geman and McClure (1985), they leave other things'
+        // edges hardly any pull. The covariance is of Cauchy's, and of edges that scatter as they should at least.
+        let last = step == STEPS;
+        let power = if last || step <= STEPS / 2 { 1 } else { 2 };
+        if last {
+            scatter = f64::max(scatter, 1.0);
+        }
         let (mut missed, mut support) = (Vec::with_capacity(lines.len()), 0.0);
         for line in lines {
-            let off = rotation.tr_mul(&line.normal);
-            let axis = off.abs().imin();
-            let miss = off[axis];
+            let (axis, miss) = line.missed(&rotation);
             if miss.abs() > REACH_SINE {
                 continue;
             }
@@ -116,7 +133,7 @@ pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> O
             missed.push(miss.abs() / line.sigma_rad);
             let trust = |sigma: f64| (1.0 + (miss / (HALF_SIGMAS * sigma)).powi(2)).recip();
             support += trust(line.sigma_rad);
-            let weight = trust(sigma) / (sigma * sigma);
+            let weight = trust(sigma).powi(power) / (sigma * sigma);
             // Turning the axis by w changes normal . axis by w . (axis x normal).
             let by_turn = rotation.column(axis).cross(&line.normal);
             information += by_turn * by_turn.transpose() * weight;
@@ -126,7 +143,7 @@ pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> O
             return None;
         }
         let inverse = information.try_inverse()?;
-        if step == STEPS {
+        if last {
             let covariance = inverse * ERRING_TOGETHER;
             let turned_apart = None;
             return Some(CommonAttitude { camera_from_object: rotation, covariance, scatter, support, turned_apart });
@@ -134,7 +151,7 @@ pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> O
         if step == STEPS / 2 {
             let middle = missed.len() / 2;
             let (_, median, _) = missed.select_nth_unstable_by(middle, f64::total_cmp);
-            scatter = (MEDIAN_TO_SIGMA * *median).max(1.0);
+            scatter = (MEDIAN_TO_SIGMA * *median).max(SCATTER_MIN);
         }
         rotation = Rotation3::new(-(inverse * pull)).matrix() * rotation;
     }
@@ -205,6 +222,10 @@ pub(crate) mod tests {
         let loose = common_attitude(&lines(&attitude, 12, &[0.008, -0.008]), &attitude).unwrap();
         assert!(loose.scatter > 3.0 && loose.covariance.trace() > 4.0 * steady.covariance.trace());
         assert!(loose.support < steady.support);
+        // Nearer than they should be, edges are worth no more.
+        let close = common_attitude(&lines(&attitude, 12, &[1e-5, -1e-5]), &attitude).unwrap();
+        assert_eq!(close.scatter, 1.0);
+        assert!(close.covariance.trace() > 0.6 * steady.covariance.trace());
     }
 
     #[test]
