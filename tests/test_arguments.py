@@ -323,7 +323,7 @@ FEATURE = corner.fit(
         (lambda: CameraSpec("equidistant", 8, 8, {}, mirror="no").check(), "mirror = 'no', expected True or False"),
         (lambda: StereoRig.load("a.toml", image_size="x"), "image_size = 'x', expected .width, height. in pixels"),
         (lambda: LiveCamera(True), "number = True, expected the number of a camera"),
-        (lambda: tiltvp.Camera("equidistant", width=8, height=8, mirror=None), "None: expected True or False"),
+        (lambda: tiltvp.Camera("equidistant", width=8, height=8, mirror=None), "mirror = None, expected True or False"),
         (lambda: zed_cameras([1280]), r"width = \[1280\], expected a number"),
         (lambda: Drive(None, camera=CAMERA), "room: NoneType, expected a tiltvp.synth.Room"),
         (lambda: Drive(Room("office", 1), camera=3), "camera: int, expected a tiltvp.Camera"),

@@ -273,10 +273,9 @@ def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> Non
         "distance_m": lambda: tracker.update(seen, np.zeros((0, 4), np.float32), distance_m=value),
     }
     for name, ask in asked.items():
-        with pytest.raises(InvalidInputError, match="expected a number that a float can hold") as caught:
+        with pytest.raises(InvalidInputError, match=f"^{name} = .*expected a number that a float can hold") as caught:
             ask()
         assert len(str(caught.value)) <= LONGEST_MESSAGE
-        assert caught.value.__notes__ == [f"while processing '{name}'"]
 
 
 @pytest.mark.parametrize("path", [b"a.toml", None, 3.5, ""])

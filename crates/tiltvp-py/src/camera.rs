@@ -45,10 +45,10 @@ impl Camera {
         width: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
         max_theta_rad: Option<Number>,
-        #[pyo3(from_py_with = convert::flag)] mirror: bool,
+        #[pyo3(from_py_with = mirror_from)] mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let max_theta_rad = max_theta_rad.map(|number| number.0);
+        let max_theta_rad = max_theta_rad.map(|number| number.of("max_theta_rad")).transpose()?;
         let pixels = format!("1 to {} pixels", core::LARGEST_SIDE_PX);
         let (width, height) = (convert::number(width, "width", &pixels)?, convert::number(height, "height", &pixels)?);
         let mut named = Vec::new();
@@ -256,6 +256,11 @@ fn in_parts<R: Sync>(
         }
         Ok(())
     })
+}
+
+/// True or False, and no other value that is true or false.
+fn mirror_from(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    convert::taken(value, "mirror", "True or False")
 }
 
 /// A number, or numbers in order. A truth value is neither.

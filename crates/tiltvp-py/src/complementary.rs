@@ -54,7 +54,7 @@ impl ComplementaryFilter {
     /// Turns on by a rate (3,), in the body's axes, that holds for so long.
     #[pyo3(signature = (rate_rad_s: "ArrayLike", duration_s))]
     fn predict(&self, rate_rad_s: &Bound<'_, PyAny>, duration_s: Number) -> PyResult<()> {
-        let duration_s = duration_s.0;
+        let duration_s = duration_s.of("duration_s")?;
         let rate = convert::vector3(rate_rad_s, "rate_rad_s")?;
         self.inner.change(rate_rad_s.py(), |filter| filter.predict(&rate, duration_s))
     }

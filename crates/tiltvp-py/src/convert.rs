@@ -198,10 +198,8 @@ pub(crate) fn to_mask<'py>(py: Python<'py>, mask: &Mask) -> PyResult<Bound<'py, 
     PyArray1::from_vec(py, usable).reshape([height, width])
 }
 
-/// A number as an argument of Python: of everything else, and of whole numbers beyond floats, a refusal of ours, to whose notes the
-/// argument's name is added.
-#[derive(Clone, Copy)]
-pub(crate) struct Number(pub(crate) f64);
+/// A number as an argument of Python. Anything else is taken by its look, which is refused with the argument's name.
+pub(crate) struct Number(Result<f64, String>);
 
 impl<'py> FromPyObject<'_, 'py> for Number {
     type Error = PyErr;
@@ -210,8 +208,15 @@ impl<'py> FromPyObject<'_, 'py> for Number {
     const INPUT_TYPE: pyo3::inspect::PyStaticExpr = <f64 as FromPyObject<'_, 'py>>::INPUT_TYPE;
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let number = value.extract().ok().filter(|_| !is_truth(&value)).map(Self);
-        number.ok_or_else(|| invalid(format!("{}: expected a number that a float can hold", shown(&value))))
+        let number = value.extract().ok().filter(|_| !is_truth(&value));
+        Ok(Self(number.ok_or_else(|| shown(&value))))
+    }
+}
+
+impl Number {
+    /// The number of the argument of that name; refuses everything else, and whole numbers beyond floats.
+    pub(crate) fn of(self, name: &str) -> PyResult<f64> {
+        self.0.map_err(|look| invalid(format!("{name} = {look}, expected a number that a float can hold")))
     }
 }
 
@@ -318,11 +323,6 @@ pub(crate) fn object<'a, 'py, T: PyTypeCheck>(
     expected: &str,
 ) -> PyResult<&'a Bound<'py, T>> {
     value.cast().map_err(|_| invalid(format!("{name}: {}, expected {expected}", describe(value))))
-}
-
-/// True or False, and no other value that is true or false.
-pub(crate) fn flag(value: &Bound<'_, PyAny>) -> PyResult<bool> {
-    value.extract().map_err(|_| invalid(format!("{}: expected True or False", shown(value))))
 }
 
 /// What a value is, for a message.

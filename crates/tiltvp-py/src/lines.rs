@@ -83,7 +83,7 @@ impl LineExtractor {
         normal: Option<&Bound<'_, PyAny>>,
         tilt_sigma_rad: Option<Number>,
     ) -> PyResult<Lines> {
-        let tilt_sigma_rad = tilt_sigma_rad.map(|number| number.0);
+        let tilt_sigma_rad = tilt_sigma_rad.map(|number| number.of("tilt_sigma_rad")).transpose()?;
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let tilt = normal.map(|normal| convert::tilt(normal, "normal")).transpose()?;

@@ -48,7 +48,7 @@ impl SelfCalibrator {
     #[new]
     #[pyo3(signature = (*, wheel_base_m, **options: "Option | None"))]
     fn new(wheel_base_m: Number, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let wheel_base_m = wheel_base_m.0;
+        let wheel_base_m = wheel_base_m.of("wheel_base_m")?;
         let parsed =
             options::given(SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() }, options)?;
         let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
@@ -69,8 +69,8 @@ impl SelfCalibrator {
         landmark_ids: &Bound<'_, PyAny>,
         bearings_rad: &Bound<'_, PyAny>,
     ) -> PyResult<CalibrationStep> {
-        let (delta_left_m, delta_right_m) = (delta_left_m.0, delta_right_m.0);
-        let motion = WheelMotion { left_m: delta_left_m, right_m: delta_right_m };
+        let motion =
+            WheelMotion { left_m: delta_left_m.of("delta_left_m")?, right_m: delta_right_m.of("delta_right_m")? };
         let names = convert::vector(landmark_ids, "landmark_ids")?
             .into_iter()
             .map(|name| landmark(name, "landmark_ids"))
@@ -213,7 +213,7 @@ pub(crate) fn calibrate(
     times_s: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<LogCalibration> {
-    let wheel_base_m = wheel_base_m.0;
+    let wheel_base_m = wheel_base_m.of("wheel_base_m")?;
     let mut usual = LogOptions::default();
     usual.filter.wheel_base_m = wheel_base_m;
     let parsed = options::given(usual, options)?;
@@ -232,7 +232,7 @@ pub(crate) fn wheel_displacements<'py>(
     heading_change_rad: &Bound<'py, PyAny>,
     wheel_base_m: Number,
 ) -> PyResult<Array<'py, f64>> {
-    let wheel_base_m = wheel_base_m.0;
+    let wheel_base_m = wheel_base_m.of("wheel_base_m")?;
     let distances = convert::vector(distance_m, "distance_m")?;
     let turns = convert::vector(heading_change_rad, "heading_change_rad")?;
     if distances.len() != turns.len() {
@@ -261,7 +261,7 @@ pub(crate) fn consistency_band(
     dof: &Bound<'_, PyAny>,
     samples: &Bound<'_, PyAny>,
 ) -> PyResult<(f64, f64)> {
-    let probability = probability.0;
+    let probability = probability.of("probability")?;
     let count = |value, name| convert::number::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
     let (dof, samples) = (count(dof, "dof")?, count(samples, "samples")?);
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {

@@ -67,9 +67,8 @@ impl Room {
     }
 
     /// Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre there.
-    fn is_free(&self, x_m: Number, y_m: Number) -> bool {
-        let (x_m, y_m) = (x_m.0, y_m.0);
-        self.world.is_free(x_m, y_m)
+    fn is_free(&self, x_m: Number, y_m: Number) -> PyResult<bool> {
+        Ok(self.world.is_free(x_m.of("x_m")?, y_m.of("y_m")?))
     }
 
     /// (count, 3): x_m, y_m, yaw_rad of poses at which the robot stands free, drawn by `seed`.
@@ -136,7 +135,7 @@ impl Room {
         contrast_min: Number,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
-        let contrast_min = contrast_min.0;
+        let contrast_min = contrast_min.of("contrast_min")?;
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
         let camera = &reader::camera(camera)?.get().inner;

@@ -210,7 +210,7 @@ pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyRe
 /// (3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
 #[pyfunction]
 pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: Number, beta_rad: Number) -> PyResult<Array<'_, f64>> {
-    let (alpha_rad, beta_rad) = (alpha_rad.0, beta_rad.0);
+    let (alpha_rad, beta_rad) = (alpha_rad.of("alpha_rad")?, beta_rad.of("beta_rad")?);
     if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
@@ -232,10 +232,12 @@ pub(crate) fn tilt_from_wheel_heights(
     half_track_m: Number,
     caster_behind_m: Number,
 ) -> PyResult<(f64, f64)> {
-    let (left_m, right_m, caster_m, half_track_m, caster_behind_m) =
-        (left_m.0, right_m.0, caster_m.0, half_track_m.0, caster_behind_m.0);
-    let layout = WheelLayout { half_track_m, caster_behind_m };
-    let tilt = layout.tilt(left_m, right_m, caster_m).map_err(|error| exception(&error))?;
+    let layout = WheelLayout {
+        half_track_m: half_track_m.of("half_track_m")?,
+        caster_behind_m: caster_behind_m.of("caster_behind_m")?,
+    };
+    let tilt = layout.tilt(left_m.of("left_m")?, right_m.of("right_m")?, caster_m.of("caster_m")?);
+    let tilt = tilt.map_err(|error| exception(&error))?;
     Ok((tilt.alpha_rad(), tilt.beta_rad()))
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn solve_corner(
     z_ray: &Bound<'_, PyAny>,
     gamma_rad: Number,
 ) -> PyResult<Vec<CornerAttitude>> {
-    let gamma_rad = gamma_rad.0;
+    let gamma_rad = gamma_rad.of("gamma_rad")?;
     let vector = |value, name| convert::vector3(value, name).map(<[f64; 3]>::from);
     let rays = [vector(x_ray, "x_ray")?, vector(y_ray, "y_ray")?, vector(z_ray, "z_ray")?];
     let feature = exact(vector(vertex, "vertex")?, rays, "")?;
@@ -105,7 +105,7 @@ pub(crate) fn fit_corner(
     z: &Bound<'_, PyAny>,
     sigma_rad: Number,
 ) -> PyResult<CornerFeature> {
-    let sigma_rad = sigma_rad.0;
+    let sigma_rad = sigma_rad.of("sigma_rad")?;
     if !(sigma_rad > 0.0 && sigma_rad.is_finite()) {
         return Err(invalid(format!("sigma_rad = {sigma_rad}, expected a standard deviation above 0, finite")));
     }
@@ -139,7 +139,7 @@ pub(crate) fn corner_attitudes(
     gamma_rad: Number,
     gamma_sigma_rad: Number,
 ) -> PyResult<Vec<CornerAttitude>> {
-    let (gamma_rad, gamma_sigma_rad) = (gamma_rad.0, gamma_sigma_rad.0);
+    let (gamma_rad, gamma_sigma_rad) = (gamma_rad.of("gamma_rad")?, gamma_sigma_rad.of("gamma_sigma_rad")?);
     let feature = &feature.get().inner;
     let found = call(py, || core::corner_attitudes(feature, &IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad }))?;
     Ok(found.iter().map(|attitude| CornerAttitude::from(*attitude)).collect())
@@ -148,7 +148,7 @@ pub(crate) fn corner_attitudes(
 /// Why a feature is no corner of that angle, in a sentence; None if it is one.
 #[pyfunction]
 pub(crate) fn screen_corner(feature: &Bound<'_, CornerFeature>, gamma_rad: Number) -> PyResult<Option<String>> {
-    let gamma_rad = gamma_rad.0;
+    let gamma_rad = gamma_rad.of("gamma_rad")?;
     let screening = Screening::of(&feature.get().inner, &IncludedAngle::exact(gamma_rad)).map_err(|e| exception(&e))?;
     let degrees = f64::to_degrees;
     Ok(match screening {
@@ -203,9 +203,12 @@ pub(crate) struct KnownBeforehand<'py> {
 }
 
 impl KnownBeforehand<'_> {
-    fn options(&self) -> PyResult<CornerOptions> {
+    fn options(self) -> PyResult<CornerOptions> {
         Ok(CornerOptions {
-            angle: IncludedAngle { gamma_rad: self.gamma_rad.0, sigma_rad: self.gamma_sigma_rad.0 },
+            angle: IncludedAngle {
+                gamma_rad: self.gamma_rad.of("gamma_rad")?,
+                sigma_rad: self.gamma_sigma_rad.of("gamma_sigma_rad")?,
+            },
             right_handed: self.right_handed,
             priors: prior::parse(&self.priors)?,
             ..CornerOptions::default()
@@ -257,7 +260,6 @@ pub(crate) fn resolve_corners(
 /// The poses that explain the features of a pair of cameras, the likeliest first; see `tiltvp.corner.poses`.
 #[pyfunction]
 #[pyo3(signature = (left, right, left_from_right: "ArrayLike", known: "Mapping[str, Any]", fuse))]
-#[expect(clippy::needless_pass_by_value, reason = "it is extracted")]
 pub(crate) fn corner_poses(
     py: Python<'_>,
     left: &Bound<'_, CornerFeature>,

@@ -63,7 +63,7 @@ pub(crate) fn match_descriptors<'py>(
     gate_rad: Option<Number>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
-    let gate_rad = gate_rad.map(|number| number.0);
+    let gate_rad = gate_rad.map(|number| number.of("gate_rad")).transpose()?;
     let pair = pair(a, b)?;
     let mut parsed = MatchOptions::default();
     options::set(&mut parsed, options)?;

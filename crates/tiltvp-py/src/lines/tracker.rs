@@ -91,7 +91,8 @@ impl LineTracker {
         distance_m: Option<Number>,
     ) -> PyResult<TrackedLines> {
         let lines: &Bound<'_, Lines> = convert::object(lines, "lines", "Lines")?;
-        let (yaw_change_rad, distance_m) = (yaw_change_rad.map(|number| number.0), distance_m.map(|number| number.0));
+        let yaw_change_rad = yaw_change_rad.map(|number| number.of("yaw_change_rad")).transpose()?;
+        let distance_m = distance_m.map(|number| number.of("distance_m")).transpose()?;
         if yaw_change_rad.is_none() && distance_m.is_some() {
             return Err(invalid("distance_m: given without yaw_change_rad, expected both or neither".to_owned()));
         }

@@ -48,7 +48,7 @@ value! {
         /// What is added, in radians.
         offset_rad: f64,
     }
-    make Self::new(Number(factor), Number(offset_rad))?.inner;
+    make Self::checked(factor, offset_rad)?.inner;
     repr format!("AffineCorrection({:?}, {:?})", own.factor, own.offset_rad);
 }
 
@@ -56,7 +56,12 @@ value! {
 impl AffineCorrection {
     #[new]
     fn new(factor: Number, offset_rad: Number) -> PyResult<Self> {
-        let (factor, offset_rad) = (factor.0, offset_rad.0);
+        Self::checked(factor.of("factor")?, offset_rad.of("offset_rad")?)
+    }
+}
+
+impl AffineCorrection {
+    fn checked(factor: f64, offset_rad: f64) -> PyResult<Self> {
         let inner = core::AffineCorrection { factor, offset_rad };
         inner.validate().map_err(|error| exception(&error))?;
         Ok(Self { inner })
@@ -127,14 +132,14 @@ impl PriorOfTilt {
     /// Every lean up to `max_rad`, in (0, pi/2), is as likely.
     #[staticmethod]
     fn uniform(max_rad: Number) -> PyResult<Self> {
-        let max_rad = max_rad.0;
+        let max_rad = max_rad.of("max_rad")?;
         Self::checked(core::PriorOfTilt::Uniform { max_rad })
     }
 
     /// Leans forward and sideways are independent and normal, each with standard deviation `sigma_rad`.
     #[staticmethod]
     fn rayleigh(sigma_rad: Number) -> PyResult<Self> {
-        let sigma_rad = sigma_rad.0;
+        let sigma_rad = sigma_rad.of("sigma_rad")?;
         Self::checked(core::PriorOfTilt::Rayleigh { sigma_rad })
     }
 
