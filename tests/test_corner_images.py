@@ -170,8 +170,8 @@ def test_detectors_and_what_stands_beside_them_agree() -> None:
         ((coloured,), {"method": "general"}, "method = 'general' beside a CornerDetector of 'coloured'"),
         ((CAMERA, coloured, LEFT_FROM_RIGHT), {"method": "paper"}, "method = 'paper'"),
         ((coloured, general, LEFT_FROM_RIGHT), {}, "method = 'coloured' beside a CornerDetector of 'general'"),
-        ((general,), {"gamma_rad": 1.2}, r"gamma_rad = 1\.2 beside a CornerDetector of 1\.57"),
-        ((oblique, general, LEFT_FROM_RIGHT), {}, r"gamma_rad = 1\.2 beside a CornerDetector of 1\.57"),
+        ((general,), {"gamma_rad": 1.2}, r"gamma_rad = 1\.2, expected 1\.57\d*, as the detector has it"),
+        ((oblique, general, LEFT_FROM_RIGHT), {}, r"gamma_rad = 1\.2, expected 1\.57\d*, as the detector has it"),
         ((coloured,), {"faces": "rgb"}, "faces"),
     ):
         with pytest.raises(InvalidInputError, match=complaint):
@@ -191,6 +191,7 @@ def test_detectors_and_what_stands_beside_them_agree() -> None:
 def test_a_right_angle_in_few_digits_is_one(gamma_rad: float) -> None:
     """Much is known of right angles alone, as which edges are parallel and where they end."""
     right = CornerPoseEstimator(CAMERA, method="general")
+    assert CornerDetector(CAMERA, method="general", gamma_rad=gamma_rad) == right.left
     assert CornerPoseEstimator(CAMERA, method="general", gamma_rad=gamma_rad) == right
     assert CornerPoseEstimator(CornerDetector(CAMERA, method="general"), gamma_rad=gamma_rad) == right
     other = CornerPoseEstimator(CAMERA, method="general", gamma_rad=1.568)

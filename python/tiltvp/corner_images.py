@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,8 +28,6 @@ __all__ = [
     "CornerPoseEstimator",
 ]
 
-_RIGHT_WITHIN_RAD: Final = 1e-3
-"""How far an angle may be from the right one and be meant as such: 1.5708 is, and 1.57."""
 _OF_ESTIMATOR = {field["name"]: field["default"] for field in _core.option_fields("CornerPoseEstimator")}
 _BESIDE: Final = {
     "down_sigma_rad": ("down",),
@@ -47,8 +44,8 @@ class CornerDetector(_core.CornerDetector):
     "coloured" finds the corner of a cuboid whose upper, left and right face are red, green and blue (`faces="rgb"`),
     "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector
     may be called from many threads at once; frozen, comparable, and to be pickled. `mask` (H, W) bool, for "general",
-    says which pixels may be used. `options` lists all options,
-    docs/corner_images.md says what they mean.
+    says which pixels may be used; its `gamma_rad` is the angle between the level edges, within 0.001 of pi / 2 the
+    right angle. `options` lists all options, docs/corner_images.md says what they mean.
     """
 
     __slots__ = ()
@@ -98,14 +95,12 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         if detectors and options:
             names = ", ".join(options)
             raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
-        method = _shared("method", method, [one.method for one in detectors])
-        method = CORNER_METHODS[0] if method is None else method
-        angles = [_right(one.options["gamma_rad"]) for one in detectors if one.method == "general"]
-        gamma_rad = _shared("gamma_rad", _right(own.get("gamma_rad")), angles)
-        if gamma_rad is not None:
-            own["gamma_rad"] = gamma_rad
-            if method == "general":
-                options["gamma_rad"] = gamma_rad
+        method = _shared(method, [one.method for one in detectors])
+        if method == "general":
+            if detectors and own.get("gamma_rad") is None:
+                own["gamma_rad"] = detectors[0].options["gamma_rad"]
+            if own.get("gamma_rad") is not None:
+                options["gamma_rad"] = own["gamma_rad"]
 
         def detector(camera: Camera | CornerDetector) -> CornerDetector:
             if isinstance(camera, _core.CornerDetector):
@@ -156,17 +151,11 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         return self(left, right, **known).corners
 
 
-def _right(gamma_rad: Any) -> Any:
-    """An angle as it is given, but for those that stand for the right one."""
-    is_number = isinstance(gamma_rad, int | float | np.number)
-    return math.pi / 2 if is_number and abs(gamma_rad - math.pi / 2) <= _RIGHT_WITHIN_RAD else gamma_rad
-
-
-def _shared(name: str, given: Any, told: Sequence[Any]) -> Any:
-    """What is given, or else what the detectors tell, which all have to tell the same."""
+def _shared(method: str | None, told: Sequence[str]) -> str:
+    """The method that is given, or else that of the detectors, which all have to have the same."""
     for one in told:
-        if given is None:
-            given = one
-        elif one != given:
-            raise InvalidInputError(f"{name} = {given!r} beside a CornerDetector of {one!r}, expected the same")
-    return given
+        if method is None:
+            method = one
+        elif one != method:
+            raise InvalidInputError(f"method = {method!r} beside a CornerDetector of {one!r}, expected the same")
+    return CORNER_METHODS[0] if method is None else method

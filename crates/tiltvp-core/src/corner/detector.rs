@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::closed_form::attitude::{IncludedAngle, corner_attitudes};
+use super::closed_form::attitude::{IncludedAngle, corner_attitudes, meant_by};
 use super::coloured::{self, ColouredScratch, Window};
 use super::estimate::Hypothesis;
 use super::feature::CornerFeature;
@@ -40,13 +40,16 @@ pub struct CornerScratch {
 }
 
 impl CornerDetector {
-    /// Makes the tables.
+    /// Makes the tables. An included angle within 1e-3 radians of the right one is that.
     ///
     /// # Errors
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, or the mask does not fit the
     /// camera, leaves nothing, or is given to the coloured front end, which takes none.
-    pub fn new(camera: Camera, options: DetectorOptions, mask: Option<Mask>) -> Result<Self> {
+    pub fn new(camera: Camera, mut options: DetectorOptions, mask: Option<Mask>) -> Result<Self> {
         options.validate()?;
+        if let CornerMethod::General(own) = &mut options.method {
+            own.gamma_rad = meant_by(own.gamma_rad);
+        }
         let light = LightTable::new(options.display_gamma)?;
         let segments = match &options.method {
             CornerMethod::Coloured(_) | CornerMethod::Paper(_) if mask.is_some() => {

@@ -53,15 +53,15 @@ impl CornerPoseEstimator {
         if let Some(down) = &mut parsed.down {
             *down = direction(down, "down")?;
         }
-        let options = parsed;
         let motion = left_from_right.map(|matrix| convert::rigid_motion(matrix, "left_from_right")).transpose()?;
         if right.is_some() != motion.is_some() {
             return Err(invalid("right, left_from_right: one without the other, expected both or none".to_owned()));
         }
         let own = left.get().inner().clone();
         let other = right.map(|right| right.get().inner().clone()).zip(motion);
-        let (copy, coloured) = (options.clone(), !matches!(own.options().method, CornerMethod::General(_)));
-        let inner = call_long(py, move || core::CornerPoseEstimator::new(own, other, copy))?;
+        let coloured = !matches!(own.options().method, CornerMethod::General(_));
+        let inner = call_long(py, move || core::CornerPoseEstimator::new(own, other, parsed))?;
+        let options = inner.options().clone();
         Ok(Self {
             inner: Shared::new(inner),
             left: left.clone().unbind(),

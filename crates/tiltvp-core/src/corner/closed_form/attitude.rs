@@ -21,6 +21,14 @@ options! {
     }
 }
 
+/// How far an angle may be from the right one and be meant as such, radians: 1.5708 is, and 1.57.
+const RIGHT_WITHIN_RAD: f64 = 1e-3;
+
+/// The included angle that is meant by one in few digits: the right one, or itself.
+pub(in crate::corner) fn meant_by(gamma_rad: f64) -> f64 {
+    if (gamma_rad - FRAC_PI_2).abs() <= RIGHT_WITHIN_RAD { FRAC_PI_2 } else { gamma_rad }
+}
+
 impl IncludedAngle {
     /// A right angle, exactly.
     pub const RIGHT: Self = Self { gamma_rad: FRAC_PI_2, sigma_rad: 0.0 };

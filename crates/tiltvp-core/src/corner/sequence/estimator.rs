@@ -7,7 +7,7 @@ use super::frame_knowledge::FrameKnowledge;
 use super::names::CornerNames;
 use super::seen_pair::SeenPair;
 use super::track::Track;
-use crate::corner::closed_form::attitude::IncludedAngle;
+use crate::corner::closed_form::attitude::{IncludedAngle, meant_by};
 use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
@@ -34,13 +34,10 @@ pub struct CornerPoseEstimator {
     pub(super) scratch: [CornerScratch; 2],
 }
 
-/// How far the included angles of detector and estimator may be apart, radians: one of them may say 1.57 for a right one.
-const SAME_ANGLE_RAD: f64 = 1e-3;
-
 /// That a detector looks for corners of the included angle that poses are of.
 fn check_angle(detector: &CornerDetector, angle: &IncludedAngle) -> Result<()> {
     match &detector.options().method {
-        CornerMethod::General(own) if (own.gamma_rad - angle.gamma_rad).abs() > SAME_ANGLE_RAD => {
+        CornerMethod::General(own) if own.gamma_rad != angle.gamma_rad => {
             Err(Error::option("gamma_rad", angle.gamma_rad, format!("{}, as the detector has it", own.gamma_rad)))
         }
         _ => Ok(()),
@@ -48,7 +45,8 @@ fn check_angle(detector: &CornerDetector, angle: &IncludedAngle) -> Result<()> {
 }
 
 impl CornerPoseEstimator {
-    /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame.
+    /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame. An included angle within 1e-3
+    /// radians of the right one is that.
     ///
     /// # Errors
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for options out of their domain and for two detectors of
@@ -56,9 +54,10 @@ impl CornerPoseEstimator {
     pub fn new(
         left: CornerDetector,
         right: Option<(CornerDetector, RigidMotion)>,
-        options: EstimatorOptions,
+        mut options: EstimatorOptions,
     ) -> Result<Self> {
         options.validate()?;
+        options.angle.gamma_rad = meant_by(options.angle.gamma_rad);
         if let Some((right, left_from_right)) = &right {
             let names = [left.options().method.name(), right.options().method.name()];
             if names[0] != names[1] {
