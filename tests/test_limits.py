@@ -191,6 +191,19 @@ def test_more_landmarks_than_the_limit_are_refused() -> None:
         tiltvp.calibrate([[0.1, 0.1]] * 2, bearings, wheel_base_m=0.4)
 
 
+def test_no_landmark_has_a_number_below_0(tmp_path: Path) -> None:
+    """With -1 for lines that nobody knows these were one landmark, which messages called 18446744073709551615."""
+    odometry, bearings = tmp_path / "odometry.csv", tmp_path / "bearings.csv"
+    odometry.write_text("step,delta_left_m,delta_right_m\n7,0.1,0.1\n")
+    bearings.write_text("step,landmark,bearing_rad\n7,3,0.1\n7,-1,0.2\n")
+    with pytest.raises(InvalidInputError, match=r"line 3: landmark = '-1', expected a whole number from 0 to"):
+        read_drive_log(odometry, bearings)
+    with pytest.raises(InvalidInputError, match=r"landmark_ids: -1, expected whole numbers from 0"):
+        tiltvp.SelfCalibrator(wheel_base_m=0.4).step(0.1, 0.1, [3, -1], [0.1, 0.2])
+    with pytest.raises(InvalidInputError, match=r"bearings: landmark: -1, expected whole numbers from 0"):
+        tiltvp.calibrate([[0.1, 0.1]] * 2, [[0, -1, 0.1], [1, -1, 0.2]], wheel_base_m=0.4)
+
+
 def test_long_messages_are_shortened(tmp_path: Path) -> None:
     (tmp_path / "camera.toml").write_bytes(own(640, 480).replace(b"equidistant", b"m" * 150_000))
     with pytest.raises(CalibrationError) as refusal:

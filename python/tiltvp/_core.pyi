@@ -2700,7 +2700,7 @@ class SelfCalibrator:
     def step(
         self, delta_left_m: float, delta_right_m: float, landmark_ids: ArrayLike, bearings_rad: ArrayLike
     ) -> CalibrationStep:
-        """Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
+        """Moves by the wheels' displacements, then looks: bearings (N,) of landmarks by whole numbers (N,) from 0.
 
         Bearings are in the camera's frame, counter-clockwise; of those taken while the robot stands only the first of
         each landmark counts. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense; the filter is

@@ -95,8 +95,8 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
 
     Columns of the odometry: `step`, `delta_left_m`, `delta_right_m`, and `time_s` if known; of the bearings: `step`,
     `landmark`, `bearing_rad`, taken at the end of that step's motion, in the sensor's frame, counter-clockwise. Steps
-    and landmarks are whole numbers, steps of the odometry grow and times do not fall, and a landmark has one bearing
-    in a step. Raises `InvalidInputError` that names file and line.
+    and landmarks are whole numbers, these from 0, steps of the odometry grow and times do not fall, and a landmark has
+    one bearing in a step. Raises `InvalidInputError` that names file and line.
     """
     table, columns = _table(odometry, _ODOMETRY, optional="time_s")
     order: dict[int, int] = {}
@@ -121,7 +121,7 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         step = _whole(seen_from, line, "step", cells[columns["step"]])
         if step not in order:
             raise InvalidInputError(f"{seen_from.where(line)}: step {step} is not one of {os.fspath(odometry)}")
-        landmark = _whole(seen_from, line, "landmark", cells[columns["landmark"]])
+        landmark = _whole(seen_from, line, "landmark", cells[columns["landmark"]], least=0)
         bearing = seen_from.number(line, "bearing_rad", cells[columns["bearing_rad"]])
         found.extend((order[step], landmark, bearing))
         lines.append(line)
@@ -204,14 +204,14 @@ def _refuse_twice(table: CsvFile, seen: NDArray[np.float64], lines: array[int], 
         )
 
 
-def _whole(table: CsvFile, line: int, column: str, word: str) -> int:
+def _whole(table: CsvFile, line: int, column: str, word: str, *, least: int = -LARGEST_WHOLE) -> int:
     try:
         # The longest within the limit has 16 digits and a sign.
         value = int(word) if len(word) < 20 and "_" not in word else None
     except ValueError:
         value = None
-    if value is None or abs(value) > LARGEST_WHOLE:
+    if value is None or not least <= value <= LARGEST_WHOLE:
         raise InvalidInputError(
-            f"{table.where(line)}: {column} = {word!r}, expected a whole number of at most {LARGEST_WHOLE}"
+            f"{table.where(line)}: {column} = {word!r}, expected a whole number from {least} to {LARGEST_WHOLE}"
         )
     return value

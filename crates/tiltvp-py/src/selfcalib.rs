@@ -55,7 +55,7 @@ impl SelfCalibrator {
         Ok(inner.into())
     }
 
-    /// Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
+    /// Moves by the wheels' displacements, then looks: bearings (N,) of landmarks by whole numbers (N,) from 0.
     ///
     /// Bearings are in the camera's frame, counter-clockwise; of those taken while the robot stands only the first of
     /// each landmark counts. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense; the filter is
@@ -169,13 +169,13 @@ impl SelfCalibrator {
     }
 }
 
-/// A landmark's number: any whole number.
+/// A landmark's number. None is below 0: -1 often stands for lines that nobody knows, which would be one landmark.
 fn landmark(name: f64, what: &str) -> PyResult<u64> {
     // From 2^53 on two whole numbers may be the same float.
-    if name.fract() != 0.0 || name.abs() >= 2f64.powi(53) {
-        return Err(invalid(format!("{what}: {name}, expected whole numbers below 2^53")));
+    if name.fract() != 0.0 || !(0.0..2f64.powi(53)).contains(&name) {
+        return Err(invalid(format!("{what}: {name}, expected whole numbers from 0, below 2^53")));
     }
-    Ok((name as i64) as u64)
+    Ok(name as u64)
 }
 
 fn log(odometry: &Bound<'_, PyAny>, bearings: &Bound<'_, PyAny>) -> PyResult<(Vec<WheelMotion>, Vec<LogBearing>)> {

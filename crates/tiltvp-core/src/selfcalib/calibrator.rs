@@ -1,5 +1,7 @@
 //! `SelfCalibrator`: the mounting of a camera, step by step while the robot drives.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::MountingEstimate;
@@ -84,7 +86,8 @@ impl SelfCalibrator {
     /// [`Error::InvalidArgument`] for numbers that are not finite, counts that differ, landmarks seen twice, and more than
     /// [`MOST_LANDMARKS`]; the filter is then as before.
     pub fn step(&mut self, motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Result<CalibrationStep> {
-        check(motion, landmarks, bearings_rad, self.landmarks())?;
+        self.check_room(landmarks)?;
+        check(motion, landmarks, bearings_rad)?;
         let seen: Vec<(u64, f64)> = landmarks.iter().copied().zip(bearings_rad.iter().copied()).collect();
         let StepOutcome { nis, used, rejected, started, .. } = match &mut self.filter {
             Filter::SlidingWindow(filter) => filter.step(motion, &seen),
@@ -112,6 +115,23 @@ impl SelfCalibrator {
             Filter::SlidingWindow(filter) => filter.landmarks(),
             Filter::Paper(filter, _) => filter.landmarks(),
         }
+    }
+
+    /// Refuses more landmarks than there is room for beside those that are followed.
+    fn check_room(&self, landmarks: &[u64]) -> Result<()> {
+        if self.landmarks() + landmarks.len() <= MOST_LANDMARKS {
+            return Ok(());
+        }
+        let followed: BTreeSet<u64> = match &self.filter {
+            Filter::SlidingWindow(filter) => filter.followed().collect(),
+            Filter::Paper(filter, _) => filter.followed().collect(),
+        };
+        let new = landmarks.iter().filter(|id| !followed.contains(id)).count();
+        if followed.len() + new > MOST_LANDMARKS {
+            let got = format!("{new} landmarks beside {} that are followed", followed.len());
+            return Err(Error::argument("landmark_ids", got, format!("at most {MOST_LANDMARKS} in all")));
+        }
+        Ok(())
     }
 
     /// The mounting as it is known now.
@@ -157,7 +177,7 @@ fn vector_covariance(polar: &Vector3<f64>, covariance: &Matrix3<f64>) -> Matrix3
 }
 
 /// Refuses a step that makes no sense.
-fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64], followed: usize) -> Result<()> {
+fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Result<()> {
     for (name, value) in [("delta_left_m", motion.left_m), ("delta_right_m", motion.right_m)] {
         if !value.is_finite() {
             return Err(Error::argument(name, value, "a finite number of metres"));
@@ -166,10 +186,6 @@ fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64], followed
     if landmarks.len() != bearings_rad.len() {
         let got = format!("{} for {} landmarks", bearings_rad.len(), landmarks.len());
         return Err(Error::argument("bearings_rad", got, "one bearing for each landmark"));
-    }
-    if followed + landmarks.len() > MOST_LANDMARKS {
-        let got = format!("{} landmarks beside {followed} that are followed", landmarks.len());
-        return Err(Error::argument("landmark_ids", got, format!("at most {MOST_LANDMARKS} in all")));
     }
     for (i, bearing) in bearings_rad.iter().enumerate() {
         if !bearing.is_finite() {
@@ -188,10 +204,17 @@ mod tests {
 
     #[test]
     fn no_more_landmarks_are_followed_than_there_is_room_for() {
-        let ids: Vec<u64> = (0..3).collect();
-        let after = |followed: usize| check(&WheelMotion::default(), &ids, &[0.0; 3], followed);
-        assert!(after(MOST_LANDMARKS - 3).is_ok());
-        assert!(after(MOST_LANDMARKS - 2).is_err() && after(MOST_LANDMARKS).is_err());
+        let most = MOST_LANDMARKS as u64;
+        let mut calibrator = SelfCalibrator::new(SelfCalibratorOptions::default()).unwrap();
+        let mut look = |ids: std::ops::Range<u64>| {
+            let ids: Vec<u64> = ids.collect();
+            calibrator.step(&WheelMotion::default(), &ids, &vec![0.0; ids.len()]).map(|_| calibrator.landmarks())
+        };
+        assert!(look(0..most + 1).is_err());
+        assert_eq!(look(0..most), Ok(MOST_LANDMARKS));
+        // Those that are followed already take no room, those beside them do.
+        assert!(look(0..3).is_ok());
+        assert!(look(most - 1..most + 1).is_err() && look(most..most + 1).is_err());
     }
 
     #[test]

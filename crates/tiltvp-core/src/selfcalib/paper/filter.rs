@@ -54,6 +54,10 @@ impl PaperFilter {
         self.features.len()
     }
 
+    pub(crate) fn followed(&self) -> impl Iterator<Item = u64> {
+        self.ids.iter().copied()
+    }
+
     pub(crate) fn step(&mut self, motion: &WheelMotion, seen: &[(u64, f64)]) -> StepOutcome {
         self.predict(motion);
         let mut outcome = StepOutcome::default();

@@ -134,7 +134,12 @@ impl SlidingWindow {
 
     /// The number of landmarks that are followed.
     pub(crate) fn landmarks(&self) -> usize {
-        self.landmark_ids.iter().flatten().count()
+        self.followed().count()
+    }
+
+    /// Their identifiers.
+    pub(crate) fn followed(&self) -> impl Iterator<Item = u64> {
+        self.landmark_ids.iter().flatten().copied()
     }
 
     /// The monitor of the innovations.
