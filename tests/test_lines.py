@@ -354,6 +354,10 @@ def test_numbers_that_tell_no_motion_are_refused(camera: tiltvp.Camera) -> None:
     ones = np.ones((1, 192), np.float32)
     with pytest.raises(InvalidInputError, match="gate_rad"):
         tl.match(ones, ones, expected_rad=[0.0], seen_rad=[0.0], gate_rad=-0.1)
+    for name in ("expected_rad", "seen_rad"):
+        bearings = {"expected_rad": [0.0], "seen_rad": [0.0], name: [np.nan]}
+        with pytest.raises(InvalidInputError, match=f"^{name}: got NaN at 0, expected finite"):
+            tl.match(ones, ones, **bearings, gate_rad=1.0)
 
 
 def test_lines_are_drawn_where_they_are(room: RoomImage, camera: tiltvp.Camera) -> None:

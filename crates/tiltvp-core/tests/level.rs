@@ -164,6 +164,10 @@ fn wrong_questions_are_refused() {
     let identity = Matrix3::identity();
     assert!(Leveller::new(camera.clone(), &(2.0 * identity), camera.clone(), &identity).is_err());
     assert!(Leveller::from_rays(camera.clone(), &identity, 3, &[[0.0; 3]; 4]).is_err());
+    for ray in [[0.0; 3], [0.0, 0.0, 1.1], [f32::INFINITY, 0.0, 0.0], [0.0, f32::NAN, 1.0]] {
+        let refused = Leveller::from_rays(camera.clone(), &identity, 2, &[ray; 4]).expect_err("no unit vector");
+        assert!(refused.to_string().starts_with("rays: got ["), "{refused}");
+    }
     let leveller = Leveller::from_rays(camera, &identity, 2, &[[0.0, 0.0, 1.0]; 4]).expect("rays");
     assert_eq!(map(leveller, &Tilt::from_alpha_beta(0.0, 0.0)).len(), 4);
 }

@@ -47,7 +47,7 @@ pub struct MatchScratch {
 /// ordering constraint.
 ///
 /// # Errors
-/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both hold whole rows and a gate has a bearing for each
+/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both hold whole rows and a gate has a finite bearing for each
 /// and is an angle from 0.
 pub fn match_descriptors(
     a: &[f32],
@@ -65,9 +65,12 @@ pub fn match_descriptors(
         if gate.gate_rad.is_nan() || gate.gate_rad < 0.0 {
             return Err(Error::argument("gate_rad", gate.gate_rad, "an angle from 0"));
         }
-        for (name, bearings, lines) in [("bearings of a", gate.expected_rad, n), ("bearings of b", gate.seen_rad, m)] {
+        for (name, bearings, lines) in [("expected_rad", gate.expected_rad, n), ("seen_rad", gate.seen_rad, m)] {
             if bearings.len() != lines {
                 return Err(Error::argument(name, format!("{} values", bearings.len()), format!("{lines}")));
+            }
+            if let Some(at) = bearings.iter().position(|bearing| !bearing.is_finite()) {
+                return Err(Error::argument(name, format!("{} at {at}", bearings[at]), "finite angles in radians"));
             }
         }
     }

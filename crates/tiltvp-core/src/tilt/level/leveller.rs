@@ -47,10 +47,11 @@ impl Leveller {
         Self::of(camera, robot_from_camera, Shown::by(shown, robot_from_shown)?)
     }
 
-    /// Level images whose pixels look along given rays of the robot frame, in row order, of any length; NaN shows nothing.
+    /// Level images whose pixels look along given rays of the robot frame, in row order, unit vectors; NaN shows nothing.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the mounting is no rotation, or there are not `width * height` rays, at least one.
+    /// [`Error::InvalidArgument`] if the mounting is no rotation, a ray no unit vector, or there are not `width * height` rays, at
+    /// least one.
     pub fn from_rays(
         camera: Camera,
         robot_from_camera: &Matrix3<f64>,

@@ -12,6 +12,9 @@ use crate::interrupt::check;
 /// made again for each image, which takes little beside so many pixels.
 const MOST_RAYS: usize = 1 << 22;
 
+/// How far the length of a ray may be off 1, as numbers in few digits are.
+const LENGTH_OFF: f32 = 1e-3;
+
 /// Rays by pixel, made once.
 #[derive(Debug, Clone)]
 pub(super) struct Shown {
@@ -48,11 +51,16 @@ impl Shown {
         Ok(made)
     }
 
-    /// Given rays, in rows of `width`.
+    /// Given rays, unit vectors or NaN, in rows of `width`.
     pub(super) fn of(rays: &[[f32; 3]], width: usize) -> Result<Self> {
         if rays.is_empty() || width == 0 || !rays.len().is_multiple_of(width) {
             let got = format!("{} in rows of {width}", rays.len());
             return Err(Error::argument("rays", got, "full rows of at least one"));
+        }
+        let is_unit = |ray: &[f32; 3]| (Vector3::from(*ray).norm() - 1.0).abs() < LENGTH_OFF;
+        if let Some(at) = rays.iter().position(|ray| !(is_unit(ray) || ray.iter().all(|x| x.is_nan()))) {
+            let got = format!("{:?} in row {at}", rays[at]);
+            return Err(Error::argument("rays", got, "unit vectors, or NaN where nothing is shown"));
         }
         let height = rays.len() / width;
         let rays = [0, 1, 2].map(|axis| rays.iter().map(|ray| ray[axis]).collect());
