@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+import threading
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,12 +18,14 @@ import tiltvp
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid
 from tiltvp.lab.evaluation.planar.warping import MinWarping, bearing_and_orientation
 from tiltvp.lab.evaluation.planar_pose import CORRECTIONS, PlanarPoseExperiment, measure_planar_pose
 from tiltvp.lab.evaluation.planar_summary import crossings, summarise_planar_pose
 from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.lab.plots.planar_pose import planar_pose
+from tiltvp.synth import Room
 
 GRID = PanoramaGrid()
 WARPING = MinWarping(GRID)
@@ -190,6 +193,26 @@ def test_ctrl_c_is_heard_while_others_work() -> None:
         "except KeyboardInterrupt:\n    sys.exit(time.monotonic() - begun > 10.0)\n"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_long_calls_of_others_are_ended_by_who_leaves() -> None:
+    """Signals are heard on the main thread alone: a room went on being built, for seconds."""
+    building, ended = threading.Event(), []
+
+    def work(job: int) -> None:
+        if job == 0:
+            building.wait(10.0)
+            return
+        building.set()
+        try:
+            Room("l-shaped", job, threads=1)
+        except InvalidInputError:
+            ended.append(job)
+            raise
+
+    with in_order(work, (0, 1), 2, threading.Event()) as done:
+        next(done)
+    assert ended == [1]
 
 
 @pytest.fixture(scope="module")

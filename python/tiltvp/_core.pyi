@@ -59,6 +59,7 @@ __all__ = [
     "LineTracker",
     "Lines",
     "LogCalibration",
+    "LongCalls",
     "MountingEstimate",
     "PixelRays",
     "PosteriorCorrection",
@@ -2076,6 +2077,20 @@ class LogCalibration:
     @property
     def wheel_base_sigma_m(self) -> float:
         """Standard deviation of it; 0 where it was not estimated."""
+
+@final
+class LongCalls:
+    """Long calls of several threads, ended together: signals are heard on the main thread alone.
+
+    A thread's calls within a `with` block are among them. Those that are ended raise, and so does each that comes
+    later.
+    """
+
+    def __enter__(self) -> None: ...
+    def __exit__(self, *_error: Any) -> None: ...
+    def __new__(cls) -> Self: ...
+    def end(self) -> None:
+        """Ends them."""
 
 @final
 class MountingEstimate:

@@ -1,5 +1,6 @@
 //! The one door into the core: releases the interpreter, catches panics, and maps errors to exceptions.
 
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -7,6 +8,7 @@ use std::time::Duration;
 
 use pyo3::import_exception;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use tiltvp_core::Error;
 use tiltvp_core::interrupt::Interrupt;
 
@@ -20,16 +22,52 @@ const POLL: Duration = Duration::from_millis(50);
 /// Memory of the stack of the thread of a long call: what the main thread has on Linux.
 const STACK_BYTES: usize = 8 << 20;
 
+thread_local! {
+    static ENDED_BY: RefCell<Option<Interrupt>> = const { RefCell::new(None) };
+}
+
+/// Long calls of several threads, ended together: signals are heard on the main thread alone.
+///
+/// A thread's calls within a `with` block are among them. Those that are ended raise, and so does each that comes later.
+#[pyclass(frozen, module = "tiltvp._core")]
+pub(crate) struct LongCalls {
+    flag: Interrupt,
+}
+
+#[pymethods]
+impl LongCalls {
+    #[new]
+    fn new() -> Self {
+        Self { flag: Interrupt::default() }
+    }
+
+    /// Ends them.
+    fn end(&self) {
+        self.flag.ask();
+    }
+
+    fn __enter__(&self) {
+        ENDED_BY.set(Some(self.flag.clone()));
+    }
+
+    #[expect(clippy::unused_self, reason = "Python calls it so")]
+    #[pyo3(signature = (*_error: "Any"))]
+    fn __exit__(&self, _error: &Bound<'_, PyTuple>) {
+        ENDED_BY.set(None);
+    }
+}
+
 /// Runs `work` without the interpreter.
 pub(crate) fn call<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
     answer(py.detach(|| catch_unwind(AssertUnwindSafe(work))))
 }
 
-/// As [`call`], for work that may take longer than a person waits: a signal such as Ctrl-C ends it and is raised.
+/// As [`call`], for work that may take longer than a person waits: a signal such as Ctrl-C ends it and is raised, as do the
+/// [`LongCalls`] that it is among.
 ///
 /// The work has a thread of its own, so that signals are heard on this one, and nobody waits for the interpreter with a lock in hand.
 pub(crate) fn call_long<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
-    let flag = Interrupt::default();
+    let flag = ENDED_BY.with_borrow(Clone::clone).unwrap_or_default();
     let (done, ended) = channel::<()>();
     let outcome = py.detach(move || {
         thread::scope(|scope| {

@@ -47,6 +47,8 @@ mod _core {
     use super::SIMD_VARIABLE;
 
     #[pymodule_export]
+    use crate::call::LongCalls;
+    #[pymodule_export]
     use crate::camera::{Camera, check_camera, lens_schema};
     #[pymodule_export]
     use crate::complementary::ComplementaryFilter;

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 import tomli_w
 
+from tiltvp._core import LongCalls
 from tiltvp.arguments import THREADS_MAX
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import refuse_file_name, whole_folder
@@ -122,16 +123,23 @@ def in_order(
 ) -> Iterator[Iterator[Result]]:
     """`work(job)` of each job, in their order, on several threads. Jobs are taken a few at a time: there may be many.
 
-    When one fails, or the caller leaves, what has not begun never does, and `stop` is set for what has.
+    When one fails, or the caller leaves, what has not begun never does; of what has long calls are ended, and `stop` is
+    set.
     """
     if not 1 <= threads <= THREADS_MAX:
         raise InvalidInputError(f"threads = {threads}, expected 1 to {THREADS_MAX}")
-    pool = ThreadPoolExecutor(threads)
-    begun = (pool.submit(work, job) for job in jobs)
+    pool, calls = ThreadPoolExecutor(threads), LongCalls()
+
+    def ended_together(job: Job) -> Result:
+        with calls:
+            return work(job)
+
+    begun = (pool.submit(ended_together, job) for job in jobs)
     try:
         yield _results(begun, _AHEAD * threads)
     finally:
         stop.set()
+        calls.end()
         pool.shutdown(wait=True, cancel_futures=True)
 
 

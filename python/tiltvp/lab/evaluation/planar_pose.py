@@ -115,17 +115,20 @@ def measure_planar_pose(
     """
     stop, rooms, at_once = Event(), range(experiment.rooms), threads or os.cpu_count() or 1
 
-    def noted() -> None:
+    def listen() -> None:
         if stop.is_set():
             raise CancelledError
-        advance()
 
-    with in_order(lambda number: _look_around(experiment, number, noted), rooms, at_once, stop) as seen:
+    with in_order(lambda number: _look_around(experiment, number, advance), rooms, at_once, stop) as seen:
         groups = list(seen)
     stop.clear()
     matcher = _Matcher(experiment)
     factors = [_trained_factor(groups, number) for number in rooms]
-    with in_order(lambda number: matcher.rows(groups[number], factors[number], noted), rooms, at_once, stop) as rows:
+
+    def match(number: int) -> list[dict[str, object]]:
+        return matcher.rows(groups[number], factors[number], listen, advance)
+
+    with in_order(match, rooms, at_once, stop) as rows:
         parts = list(rows)
     return pl.DataFrame(list(itertools.chain(*parts)), schema=_SCHEMA)
 
@@ -208,8 +211,13 @@ class _Matcher:
         self._closed_form = TiltEstimator(experiment.camera, method=_PAPER, correction="closed-form")
         self._refined = TiltEstimator(experiment.camera, method="refined")
 
-    def rows(self, group: _Group, factor: float, advance: Callable[[], None]) -> list[dict[str, object]]:
-        """Those of the table that come from one room, with the factor that the others have trained."""
+    def rows(
+        self, group: _Group, factor: float, listen: Callable[[], None], advance: Callable[[], None]
+    ) -> list[dict[str, object]]:
+        """Those of the table that come from one room, with the factor that the others have trained.
+
+        `listen` is called before each pair, which takes a fifth of a second, and raises to end the work.
+        """
         trained = TiltEstimator(self._experiment.camera, method=_PAPER, correction=factor)
         estimators = (trained, self._closed_form, self._refined)
         looks = [{tilt: self._look(view, estimators) for tilt, view in views.items()} for views in group.views]
@@ -218,6 +226,7 @@ class _Matcher:
             for first, tilt in itertools.product(range(len(group.poses)), self._experiment.tilts_deg):
                 if first == second:
                     continue
+                listen()
                 known = {
                     "kind": group.kind,
                     "room_seed": group.room_seed,
