@@ -118,6 +118,36 @@ def test_a_stream_without_frames_is_wrong_use(
     assert (said.code, said.out, (folder / out).exists()) == (2, "", False)
     assert said.complaint == "tiltvp: -: no frames came, expected one or more\n"
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("dataset drive --out .", ".: exists, expected a new folder, or --overwrite to replace a dataset"),
+        ("dataset drive --out d --frames 0", "--frames = 0, expected a number in [1, 100000]"),
+        ("dataset drive --out d --frames 9 --legs 1,0",
+         "--frames beside --legs, which have as many as they need, expected one of them"),
+        ("dataset drive --out d --legs round",
+         '--legs: got "round", expected one of paper, alternating, straight, rotation, arcs'),
+        ("dataset drive --out d --camera no.toml", "no.toml: no such file, expected a calibration file, at this path"),
+        ("dataset stereo --out .", ".: exists, expected a new folder, or --overwrite to replace a dataset"),
+        ("dataset stereo --out d --samples 99", "--samples = 99, expected rays per pixel side in [1, 8]"),
+        ("dataset stereo --out d --distance 3 1",
+         "--distance = 3, expected least and greatest metres, ascending, in [0.3, 20]"),
+        ("lab drive --out d.mcap --encoder-k-m -1", "--encoder-k-m = -1, expected metres in [0, 0.1]"),
+        ("lab drive --out d.mcap --mount 0 0 90 9", "--mount = 9, expected a height_m of metres in [0.05, 2.2]"),
+    ],
+)  # fmt: skip
+def test_it_is_told_before_a_room_is_built(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, words: str, told: str
+) -> None:
+    """Which takes seconds."""
+    for name in ("tiltvp.synth.Laboratory", "tiltvp.synth.Room", "tiltvp.lab.datasets.driving.Room"):
+        monkeypatch.setattr(name, lambda *_, **__: pytest.fail("a room is built"))
+    before = set(folder.iterdir())
+    said = run(*words.split())
+    assert (said.code, said.complaint) == (2, f"tiltvp: {told}\n")
+    assert set(folder.iterdir()) == before
+
+
 
 @pytest.mark.parametrize("verb", sorted(verbs(app)), ids=" ".join)
 def test_counts_have_an_end(verb: tuple[str, ...]) -> None:

@@ -1209,6 +1209,10 @@ class Drive:
     def camera(self) -> Camera:
         """The camera."""
 
+    @staticmethod
+    def check(**options: Any) -> None:
+        """Raises what `Drive` raises for these options, whatever the room."""
+
     @property
     def edges_m(self) -> NDArray[np.float64]:
         """(E, 4): x_m, y_m, lowest and highest z_m of the room's upright edges, visible or not; the row is the number.
@@ -2844,6 +2848,10 @@ class StereoSequence:
     @property
     def cameras(self) -> tuple[Camera, Camera]:
         """The left and the right camera."""
+
+    @staticmethod
+    def check(**options: Any) -> None:
+        """Raises what `StereoSequence` raises for these options, whatever the scene."""
 
     @property
     def corner(self) -> int:

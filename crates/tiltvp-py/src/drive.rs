@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use tiltvp_synth::{DriveOptions, Mount, RobotPose};
 
 use crate::array::Array;
-use crate::call::invalid;
+use crate::call::{exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -49,6 +49,13 @@ impl Drive {
         let (world, lens) = (room.get().world.clone(), camera.get().inner.clone());
         let inner = call_on_threads(room.py(), threads, || tiltvp_synth::Drive::new(world, lens, parsed))?;
         Ok(Self { room: room.clone().unbind(), camera: camera.clone().unbind(), inner })
+    }
+
+    /// Raises what `Drive` raises for these options, whatever the room.
+    #[staticmethod]
+    #[pyo3(signature = (**options: "Any"))]
+    fn check(options: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+        options::given(DriveOptions::default(), options)?.validate().map_err(|error| exception(&error))
     }
 
     /// The room.

@@ -69,6 +69,13 @@ impl StereoSequence {
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 
+    /// Raises what `StereoSequence` raises for these options, whatever the scene.
+    #[staticmethod]
+    #[pyo3(signature = (**options: "Any"))]
+    fn check(options: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+        options::given(StereoOptions::default(), options)?.validate().map_err(|error| exception(&error))
+    }
+
     /// The laboratory or room.
     #[getter]
     fn scene<'py>(&self, py: Python<'py>) -> PyResult<Scene<'py>> {

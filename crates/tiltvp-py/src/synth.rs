@@ -118,10 +118,10 @@ impl Room {
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
         let pose = shot.pose();
-        let height: u16 = convert::number(height, "height", "a whole number of pixels")?;
+        let height: usize = convert::number(height, "height", "a whole number of pixels")?;
         let seen = call_on_threads(py, threads, || {
             let up = shot.camera_height_m.unwrap_or_else(|| View::new(&|_, _| None, 1, 1, pose).camera_height_m);
-            tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &shot.rendering)
+            tiltvp_synth::render_panorama(&self.world, pose, up, height, &shot.rendering)
         })?;
         pictures(py, seen.image)
     }

@@ -148,7 +148,7 @@ fn mount_is_possible(options: &DriveOptions) -> Result<()> {
         ("height_m", height_m, 0.05, 2.2, "metres in [0.05, 2.2]"),
     ] {
         if !(low..=high).contains(&value) {
-            return Err(Error::option("mount", options.mount.to_value(), format!("a {name} of {expected}")));
+            return Err(Error::option("mount", value, format!("a {name} of {expected}")));
         }
     }
     let rotation = &options.robot_from_camera;

@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use tiltvp_core::Result;
 use tiltvp_core::geometry::{Tilt, angle_between};
 use tiltvp_core::interrupt::check;
+use tiltvp_core::{Error, Result};
 
 use crate::noise::hash_unit;
 use crate::segment::Segment;
 use crate::tone::{Film, Image, RenderOptions};
-use crate::view::{RobotPose, View};
+use crate::view::{LARGEST_SIDE_PX, RobotPose, View};
 use crate::world::World;
 
 /// What is known of a rendered image.
@@ -98,7 +98,10 @@ pub fn render_panorama(
     height_px: usize,
     options: &RenderOptions,
 ) -> Result<Rendering> {
-    let step = std::f64::consts::PI / height_px.max(1) as f64;
+    if !(1..=LARGEST_SIDE_PX / 2).contains(&height_px) {
+        return Err(Error::argument("height", height_px, format!("pixels in [1, {}]", LARGEST_SIDE_PX / 2)));
+    }
+    let step = std::f64::consts::PI / height_px as f64;
     let lens = |x: f64, y: f64| {
         let (azimuth, elevation) = (step * (height_px as f64 - 0.5 - x), step * (0.5 * (height_px as f64 - 1.0) - y));
         let (s, c) = elevation.sin_cos();

@@ -60,7 +60,7 @@ impl StereoSequence {
         options.validate()?;
         let corners = world.corners();
         if let Some(corner) = options.corner.filter(|&corner| corner >= corners.len()) {
-            return Err(Error::option("stereo.corner", corner, "the number of one of the world's corners"));
+            return Err(Error::option("corner", corner, format!("the number of one of {} corners", corners.len())));
         }
         let mut rng = Rng::new(options.seed, 1 << 34);
         let is_large = |k: &usize| corners[*k].lengths_m.iter().all(|length| *length >= LARGE_M);
@@ -85,7 +85,8 @@ impl StereoSequence {
                 }
             }
         }
-        Err(Error::argument("stereo.corner", format!("{} corners", order.len()), "one with space to look at it"))
+        let got = options.corner.map_or_else(|| format!("none of {}", order.len()), |corner| corner.to_string());
+        Err(Error::argument("corner", got, "one with space to look at it"))
     }
 
     /// How the pair moves.

@@ -4,6 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::{Error, Result};
 
+/// The longest side of an image, pixels: the light of a square of such sides takes 3.5 GB.
+pub(crate) const LARGEST_SIDE_PX: usize = 16_384;
+
 /// A lens: the unit bearing, in the camera frame, of an image point `(x, y)` in pixels (centres are integers), or none
 /// outside the lens' valid set. Any closure of that shape is one.
 pub trait Lens: Sync {
@@ -68,8 +71,8 @@ impl<'a> View<'a> {
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for the first field outside its domain.
     pub fn validate(&self) -> Result<()> {
         for (name, size) in [("view.width_px", self.width_px), ("view.height_px", self.height_px)] {
-            if !(1..=16_384).contains(&size) {
-                return Err(Error::option(name, size, "pixels in [1, 16384]"));
+            if !(1..=LARGEST_SIDE_PX).contains(&size) {
+                return Err(Error::option(name, size, format!("pixels in [1, {LARGEST_SIDE_PX}]")));
             }
         }
         let RobotPose { x_m, y_m, yaw_rad } = self.pose;

@@ -19,7 +19,13 @@ _OF_PYTHON: Final = {
 
 OPTIONS: Final[ContextVar[Callable[[], Collection[str]]]] = ContextVar("options", default=tuple)
 """The names of the options that the command of a line takes."""
-_OTHERWISE: Final = {"blur_sigma_px": "--blur-sigma", "bumps_max_rad": "--bumps-deg", "factor": "--resolution-scale"}
+_OTHERWISE: Final = {
+    "blur_sigma_px": "--blur-sigma",
+    "bumps_max_rad": "--bumps-deg",
+    "distance_m": "--distance",
+    "factor": "--resolution-scale",
+    "gamma_rad": "--gamma-deg",
+}
 """Options of commands that the library has under other names."""
 
 

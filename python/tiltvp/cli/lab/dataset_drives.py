@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter, validators
 
@@ -55,25 +55,28 @@ def drive(
     from tiltvp.lab.datasets.driving import drive_room, write_drive
     from tiltvp.synth import Drive
 
+    making.check()
+    if frames is not None and way.legs is not None:
+        raise InvalidInputError("--frames beside --legs, which have as many as they need, expected one of them")
+    camera = lens.load()
+    options: dict[str, Any] = {
+        "robot_from_camera": lens.rotation(),
+        "mount": way.mount_rad,
+        "blind_rad": lens.blind_rad,
+        "frames": frames,
+        "legs": None if way.legs is None else legs_from(way.legs),
+        "seed": making.seed,
+        "encoder_k_m": way.encoder_k_m,
+        "bumps_max_rad": math.radians(way.bumps_deg),
+        "lighting": lighting,
+        "samples": rendering.samples,
+        "noise_sigma": rendering.noise_sigma,
+    }
+    Drive.check(**options)
     room = drive_room(
         kind, making.seed, extent=extent, floor_gloss=floor_gloss, wall_pattern=wall_pattern, threads=making.threads
     )
-    made = Drive(
-        room,
-        camera=lens.load(),
-        robot_from_camera=lens.rotation(),
-        mount=way.mount_rad,
-        blind_rad=lens.blind_rad,
-        frames=frames,
-        legs=None if way.legs is None else legs_from(way.legs),
-        seed=making.seed,
-        encoder_k_m=way.encoder_k_m,
-        bumps_max_rad=math.radians(way.bumps_deg),
-        lighting=lighting,
-        samples=rendering.samples,
-        noise_sigma=rendering.noise_sigma,
-        threads=making.threads,
-    )
+    made = Drive(room, camera=camera, threads=making.threads, **options)
     with progress_bar(len(made), "frames") as bar:
         source = made_by("drive") | lens.source
         write_drive(made, making.out, threads=making.threads, source=source, force=making.replaces, advance=bar.advance)
@@ -121,7 +124,19 @@ def stereo(
     from tiltvp.lab.datasets.stereo import write_stereo
     from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
+    making.check()
     left, right = zed_cameras(width)
+    options: dict[str, Any] = {
+        "frames": frames,
+        "seed": making.seed,
+        "corner": corner,
+        "distance_m": distance,
+        "samples": rendering.samples,
+        "noise_sigma": rendering.noise_sigma,
+        "blur_sigma_px": blur_sigma,
+        "exposure_s": exposure_ms / 1000.0,
+    }
+    StereoSequence.check(**options)
     if kind != "laboratory" and gamma_deg != 90.0:
         raise InvalidInputError(f"--gamma-deg {gamma_deg}, expected it with --kind laboratory alone")
     scene = (
@@ -129,20 +144,7 @@ def stereo(
         if kind == "laboratory"
         else Room(kind, making.seed, clutter=clutter, threads=making.threads)
     )
-    sequence = StereoSequence(
-        scene,
-        left=left,
-        right=right,
-        frames=frames,
-        seed=making.seed,
-        corner=corner,
-        distance_m=distance,
-        samples=rendering.samples,
-        noise_sigma=rendering.noise_sigma,
-        blur_sigma_px=blur_sigma,
-        exposure_s=exposure_ms / 1000.0,
-        threads=making.threads,
-    )
+    sequence = StereoSequence(scene, left=left, right=right, threads=making.threads, **options)
     with progress_bar(len(sequence), "frames") as bar:
         write_stereo(
             sequence,

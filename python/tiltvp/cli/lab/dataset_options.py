@@ -46,6 +46,12 @@ class MakingOptions:
         """Whether a dataset that is there makes room."""
         return self.force or not keeps_existing()
 
+    def check(self) -> None:
+        """Refuses a place that is taken, before what is written there is made."""
+        from tiltvp.lab.datasets.new import refuse_taken
+
+        refuse_taken(self.out, self.replaces)
+
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +182,10 @@ def legs_from(words: Sequence[str]) -> NDArray[np.float64]:
     from tiltvp.synth import drive_legs
 
     if len(words) == 1 and words[0].isalpha():
-        return drive_legs(words[0])
+        try:
+            return drive_legs(words[0])
+        except InvalidInputError as error:  # It calls the word a kind.
+            raise InvalidInputError(str(error).replace("kind", "--legs", 1)) from error
     return np.array([_pair(word.split(","), f"--legs {word!r}", "METRES,DEGREES") for word in words]) * (
         1.0,
         np.pi / 180.0,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.dataset_options import LensOptions, Mount, RenderingOptions, WayOptions, Words, legs_from
 from tiltvp.cli.options import ALL_CORES, Seed, Switch, Threads
@@ -14,6 +15,15 @@ from tiltvp.cli.root import group
 from tiltvp.cli.terminal import progress_bar, say
 
 app = group("lab", "What the laboratory makes to try the package on.")
+
+_LEAN_MAX_DEG = 28
+"""Half a radian, as drives have them."""
+
+
+def _check_slope(_: object, slope_deg: tuple[float, float]) -> None:
+    slope, direction = slope_deg
+    if not (0.0 <= slope <= _LEAN_MAX_DEG and math.isfinite(direction)):
+        raise ValueError(f"Must be a slope from 0 to {_LEAN_MAX_DEG} and a finite direction.")
 
 
 @Parameter(name="*")
@@ -26,11 +36,13 @@ class RecordedWayOptions(WayOptions):
     mount: Mount | None = None
     """Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
     default 0.1 0.03 0 0.4."""
-    mounting_deg: tuple[float, float] = (0.0, 0.0)
+    mounting_deg: Annotated[
+        tuple[float, float], Parameter(validator=validators.Number(gte=-_LEAN_MAX_DEG, lte=_LEAN_MAX_DEG))
+    ] = (0.0, 0.0)
     """Roll and pitch of the camera's mounting, which nobody knows."""
-    floor_slope_deg: tuple[float, float] = (0.0, 0.0)
+    floor_slope_deg: Annotated[tuple[float, float], Parameter(validator=_check_slope)] = (0.0, 0.0)
     """By how much the floor falls, and where to: degrees to the left of the robot's first heading."""
-    bumps_deg: float = 2.0
+    bumps_deg: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=_LEAN_MAX_DEG))] = 2.0
     """Greatest lean from bumps."""
 
 
@@ -45,7 +57,7 @@ def drive(
     lens: LensOptions = _LENS,
     kind: str = "office",
     way: RecordedWayOptions = _WAY,
-    camera_delay_s: float = 0.0,
+    camera_delay_s: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.0,
     compressed: Switch = False,
     rendering: RenderingOptions = _RENDERING,
     seed: Seed = 0,
@@ -78,27 +90,33 @@ def drive(
     from tiltvp.lab.datasets.recording import LEGS, MOUNT, RecordedDrive
     from tiltvp.lab.datasets.recording import Mount as CameraMount
     from tiltvp.streams.outputs.mcap import check_recording
+    from tiltvp.synth import Drive
 
     check_recording(out)
     if camera_out is not None:
         check_toml(camera_out)
         check_output(camera_out)
-    camera = lens.load()
+    camera, rotation = lens.load(), lens.rotation()
+    mount = MOUNT if way.mount_rad is None else CameraMount(*way.mount_rad)
+    known: dict[str, Any] = {
+        "legs": LEGS if way.legs is None else legs_from(way.legs),
+        "noise_sigma": rendering.noise_sigma,
+        "samples": rendering.samples,
+        "encoder_k_m": way.encoder_k_m,
+        "seed": seed,
+    }
+    Drive.check(mount=mount, **known)
     made = RecordedDrive(
         drive_room(kind, seed, threads=threads),
         camera,
-        legs=LEGS if way.legs is None else legs_from(way.legs),
-        robot_from_camera=lens.rotation(),
-        mount=MOUNT if way.mount_rad is None else CameraMount(*way.mount_rad),
+        robot_from_camera=rotation,
+        mount=mount,
         mounting_rad=_radians(way.mounting_deg),
         floor_slope_rad=_radians(way.floor_slope_deg),
         bumps_max_rad=math.radians(way.bumps_deg),
         camera_delay_s=camera_delay_s,
         compressed=compressed,
-        noise_sigma=rendering.noise_sigma,
-        samples=rendering.samples,
-        encoder_k_m=way.encoder_k_m,
-        seed=seed,
+        **known,
     )
     with progress_bar(len(made), "frames") as bar:
         made.write(out, threads=threads, advance=bar.advance)

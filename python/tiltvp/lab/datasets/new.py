@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["NewDataset", "in_order", "new_dataset", "new_folder"]
+__all__ = ["NewDataset", "in_order", "new_dataset", "new_folder", "refuse_taken"]
 
 _CAMERA: Final = "camera.toml"
 _IMAGES: Final = "images"
@@ -111,10 +111,10 @@ def new_dataset(
 def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[NewDataset]:
     """A folder to be filled in a `with` block, dataset.toml included; else as `new_dataset`."""
     target = Path(directory)
-    _refuse_taken(target, force)
+    refuse_taken(target, force)
     with whole_folder(target) as part:
         yield NewDataset(part)
-        _refuse_taken(target, force)
+        refuse_taken(target, force)
 
 
 @contextmanager
@@ -155,7 +155,8 @@ def _results(begun: Iterator[Future[Result]], ahead: int) -> Iterator[Result]:
         yield future.result()
 
 
-def _refuse_taken(target: Path, force: bool) -> None:
+def refuse_taken(target: Path, force: bool) -> None:
+    """Refuses a place that is taken; with `force` by other than a dataset or an empty folder."""
     refuse_file_name(target)
     if not target.exists() and not target.is_symlink():
         return

@@ -104,6 +104,8 @@ class RecordedDrive:
         ):
             if not least <= value <= most:
                 raise InvalidInputError(f"{name}: {value:g}, expected a number in [{least:g}, {most:g}]")
+        if not math.isfinite(self.floor_slope_rad[1]):
+            raise InvalidInputError(f"floor_slope_rad: {self.floor_slope_rad[1]:g}, expected a finite direction")
 
     @cached_property
     def nominal(self) -> Rows:
