@@ -79,6 +79,15 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ("dataset drive --out d --bumps-deg 90", "--bumps-deg = 90 degrees, expected in [0, 28.65] degrees"),
         ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --start 0 0 3.2",
          "--start: a yaw of 3.2 radians, expected at most pi; 3.2 degrees are 0.05585"),
+        ("dataset panoramas --out d --height 0", "--height: got 0, expected pixels in [1, 8192]"),
+        ("lab drive --out d.mcap --floor-slope-deg -1 0",
+         'Invalid value "(-1.0, 0.0)" for --floor-slope-deg. Must be a slope from 0 to 28 and a finite direction. Try '
+         "`tiltvp lab drive --help`."),
+        ("measure scaling --scales 1e9",
+         'Invalid value "(1000000000.0,)" for --scales. Must be <= 100. Try `tiltvp measure scaling --help`.'),
+        ("measure colmap --kinds --seed 3", "--kinds: no word follows, expected one or more"),
+        ("calibrate wheels.csv bearings.csv --wheel-base 0.4 --read-as",
+         "--read-as: no word follows, expected one or more"),
         ("measure sampling --every 3", "--every 3 without a folder of panoramas, expected both"),
         ("measure striding --every 3", "--every 3 without a folder of panoramas, expected both"),
         ("measure corner-attitudes --every 3", "--every 3 without a folder of panoramas, expected both"),
@@ -106,17 +115,6 @@ def test_it_is_told(run: Run, folder: Path, words: str, told: str) -> None:
     assert said.complaint == f"tiltvp: {told}\n"
     assert set(folder.iterdir()) == before
 
-
-@pytest.mark.parametrize("verb", ["tilt", "tilt --threads 2", "segments", "lines", "track", "level"])
-@pytest.mark.parametrize("words", [(), ("--raw", "256x256")])
-def test_a_stream_without_frames_is_wrong_use(
-    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, verb: str, words: tuple[str, ...]
-) -> None:
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO()))
-    out = "out.avi" if verb == "level" else "out.csv"
-    said = run(*verb.split(), "-", "--camera", "camera.toml", "--out", out, *words)
-    assert (said.code, said.out, (folder / out).exists()) == (2, "", False)
-    assert said.complaint == "tiltvp: -: no frames came, expected one or more\n"
 
 @pytest.mark.parametrize(
     ("words", "told"),
@@ -147,6 +145,17 @@ def test_it_is_told_before_a_room_is_built(
     assert (said.code, said.complaint) == (2, f"tiltvp: {told}\n")
     assert set(folder.iterdir()) == before
 
+
+@pytest.mark.parametrize("verb", ["tilt", "tilt --threads 2", "segments", "lines", "track", "level"])
+@pytest.mark.parametrize("words", [(), ("--raw", "256x256")])
+def test_a_stream_without_frames_is_wrong_use(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, verb: str, words: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO()))
+    out = "out.avi" if verb == "level" else "out.csv"
+    said = run(*verb.split(), "-", "--camera", "camera.toml", "--out", out, *words)
+    assert (said.code, said.out, (folder / out).exists()) == (2, "", False)
+    assert said.complaint == "tiltvp: -: no frames came, expected one or more\n"
 
 
 @pytest.mark.parametrize("verb", sorted(verbs(app)), ids=" ".join)

@@ -74,6 +74,7 @@ def run_words(arguments: Sequence[str] | None) -> int:
     OPTIONS.set(lambda: {name for one in options_of(app, words) for name in one.names})
     try:
         _refuse_empty(words)
+        _refuse_wordless(words)
         with nullcontext() if overwrite else keeping_existing():
             code = run(words)
         sys.stdout.flush()
@@ -109,6 +110,14 @@ def _refuse_empty(words: Sequence[str]) -> None:
         if word == "" or re.fullmatch("--[^=]+=", word):
             option = word.removesuffix("=") or (before if before.startswith("--") else "an argument")
             raise InvalidInputError(f"{option}: an empty word, expected one that is not (a variable that is not set?)")
+
+
+def _refuse_wordless(words: Sequence[str]) -> None:
+    """Refuses an option of several words that has none, which the parser takes for no value at all."""
+    bare = {word for word, after in zip(words, (*words[1:], "--"), strict=True) if word[:2] == after[:2] == "--"}
+    for one in options_of(app, words) if bare else ():
+        for option in bare.intersection(one.names if one.parameter.consume_multiple else ()):
+            raise InvalidInputError(f"{option}: no word follows, expected one or more")
 
 
 def _is_there(word: str) -> bool:

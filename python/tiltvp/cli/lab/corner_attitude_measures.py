@@ -61,7 +61,7 @@ def corner_attitudes(
     from tiltvp.synth import OUTDOOR_KINDS, ROOM_KINDS
 
     check_ending(out)
-    refuse_every(directory, every, 1)
+    refuse_every(directory, every)
     known = (*OUTDOOR_KINDS, *ROOM_KINDS)
     for kind in kinds:
         if kind not in known:

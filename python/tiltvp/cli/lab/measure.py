@@ -33,11 +33,15 @@ from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.lab.trust import trust
-from tiltvp.cli.options import ALL_CORES, AtLeast1, Switch, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Switch, Threads, at_least
 from tiltvp.cli.root import group
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
+
+_SENSORS = Parameter(validator=validators.Number(gte=0.01, lte=100))
+"""From 64 x 48 pixels to 31 megapixels."""
+_SAMPLED_EVERY = 4
 
 app = group("measure", "Measure how well all this works, where the truth is known.")
 app.command(body)
@@ -164,8 +168,8 @@ def inertial(directory: Path, /, *, samples: Samples = 2) -> None:
 @app.command
 def scaling(
     *,
-    images: Annotated[tuple[Whole, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
-    scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
+    images: Annotated[tuple[Whole, ...], Parameter(consume_multiple=True), at_least(1)] = (21, 42, 84, 168),
+    scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True), _SENSORS] = (0.25, 0.5, 1.0, 2.0, 4.0),
     sweep: str = "paper",
     threads: Threads = ALL_CORES,
     out: Saved = None,
@@ -238,7 +242,7 @@ def sampling(
     directory: PanoramasIfAny = None,
     /,
     *,
-    every: Every = 4,
+    every: Every = _SAMPLED_EVERY,
     rooms: Rooms = 4,
     kind: str | None = None,
     seeds: AtLeast1 = 5,
@@ -265,7 +269,7 @@ def sampling(
     from tiltvp.synth import ROOM_KINDS
 
     check_ending(out)
-    refuse_every(directory, every, 4)
+    refuse_every(directory, every, _SAMPLED_EVERY)
     if kind is not None and rooms == 0:
         raise InvalidInputError(f"--kind {kind} with --rooms 0, expected rooms")
     camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)

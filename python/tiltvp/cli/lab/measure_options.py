@@ -22,7 +22,7 @@ LeansDeg = Annotated[tuple[float, ...], Parameter(consume_multiple=True, validat
 Saved = Annotated[Path | None, Parameter(help="Also write the table: .csv, .json or .parquet.")]
 
 
-def refuse_every(directory: Path | None, every: int, default: int) -> None:
+def refuse_every(directory: Path | None, every: int, default: int = 1) -> None:
     """Refuses one panorama in so many where there are none."""
     if directory is None and every != default:
         raise InvalidInputError(f"--every {every} without a folder of panoramas, expected both")

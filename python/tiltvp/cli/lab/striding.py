@@ -32,7 +32,7 @@ def striding(
     from tiltvp.lab.evaluation.views import view_sources
 
     check_ending(out)
-    refuse_every(directory, every, 1)
+    refuse_every(directory, every)
     camera, tables = paper_camera(), []
     for source in view_sources(directory, camera, every=every, rooms=rooms):
         with progress_bar(source.count, source.title) as bar:
