@@ -3,7 +3,6 @@
 # Annotations are evaluated: other files inherit these options, and there cyclopts would not find the names of types.
 
 import difflib
-import math
 import os
 import re
 from collections.abc import Sequence
@@ -30,7 +29,8 @@ _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
-FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
+FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gte=0.01, lte=1000))]
+"""From time-lapses to fast cameras: OpenCV writes no video of 0.001 frames a second, nor of 100,000."""
 ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
 

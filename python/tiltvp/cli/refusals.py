@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 from cyclopts import App, CoercionError, CycloptsError, MissingArgumentError, UnusedCliTokensError
@@ -35,7 +36,8 @@ def told(error: CycloptsError, app: App, words: Sequence[str]) -> str:
 
 def _left_over(unused: Sequence[str], app: App, words: Sequence[str]) -> str:
     """Of words that nothing takes: one after a switch is taken for its value by who types it."""
-    before = words[words.index(unused[0]) - 1] if unused[0] in words[1:] else ""
+    # The last one: an option before it may have taken the same word.
+    before = next((before for before, word in reversed([*pairwise(words)]) if word == unused[0]), "")
     for one in options_of(app, words) if before.startswith("--") else ():
         if before in one.names:
             return f'Invalid value "{unused[0]}" for {before}. Expected {" or ".join(one.names)} alone.'

@@ -81,7 +81,7 @@ class KeptOptions:
         """
         from tiltvp.streams import open_frames
 
-        once = self._once(words)
+        once = self._once(words, camera)
         if once is not None:
             return once
         frames = open_frames(list(words), topic=self.topic, option=topic_option)
@@ -90,7 +90,7 @@ class KeptOptions:
             check_sizes(frames, camera, names_each=names_each)
         return frames
 
-    def _once(self, words: Sequence[str]) -> Frames | None:
+    def _once(self, words: Sequence[str], camera: _core.Camera | None) -> Frames | None:
         """Frames that come only once, where words or options name such."""
         if list(words) == [STDIN]:
             raise InvalidInputError("-: comes only once, expected images, a video or a recording")
@@ -107,7 +107,8 @@ class SourceOptions(KeptOptions):
     raw: str | None = None
     """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
 
-    def _once(self, words: Sequence[str]) -> Frames | None:
+    def _once(self, words: Sequence[str], camera: _core.Camera | None) -> Frames | None:
+        from tiltvp.images import size_problem
         from tiltvp.streams import LiveCamera, NamedImages, RawImages
         from tiltvp.streams.live import raw_size
 
@@ -119,9 +120,14 @@ class SourceOptions(KeptOptions):
             return LiveCamera(self.live)
         if not words:
             raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
-        if list(words) == [STDIN]:
-            return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
-        return None
+        if list(words) != [STDIN]:
+            return None
+        if self.raw is None:
+            return NamedImages()
+        shape = raw_size(self.raw)
+        if camera is not None and shape[:2] != (camera.height, camera.width):
+            raise InvalidInputError(f"--raw {self.raw}: {size_problem((shape[1], shape[0]), camera)}")
+        return RawImages(shape)
 
 
 @Parameter(name="*", group=Group("Odometry"))
