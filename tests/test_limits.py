@@ -274,7 +274,9 @@ def test_the_name_of_a_file_is_no_folder_unless_it_is_there(name: str, tmp_path:
         check_output_folder(folder)
 
 
-@pytest.mark.parametrize("value", [10**400, 10**5000, "1", [1.0], object()], ids=type)
+@pytest.mark.parametrize(
+    "value", [10**400, 10**5000, "1", [1.0], object(), np.complex64(1 + 5j), np.array(True), np.array("1")], ids=type
+)
 def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> None:
     camera = {"width": 64, "height": 48, "focal_px": 30.0, "cx": 31.5, "cy": 23.5}
     calibrator, tracker = tiltvp.SelfCalibrator(wheel_base_m=0.4), tiltvp.lines.LineTracker()
@@ -289,6 +291,14 @@ def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> Non
         with pytest.raises(InvalidInputError, match=f"^{name} = .*expected a number that a float can hold") as caught:
             ask()
         assert len(str(caught.value)) <= LONGEST_MESSAGE
+
+
+def test_values_that_do_not_fit_a_line_are_told_by_their_kind() -> None:
+    camera = tiltvp.Camera.equidistant(width=64, height=48, focal_px=30.0, cx=31.5, cy=23.5)
+    masks = {r"shape \[48, 64\] of object": np.ones((48, 64), object), "list": [[True] * 64] * 48}
+    for look, mask in masks.items():
+        with pytest.raises(InvalidInputError, match=f"^option mask = {look}, expected a"):
+            tiltvp.TiltEstimator(camera, mask=mask)
 
 
 @pytest.mark.parametrize("path", [b"a.toml", None, 3.5, ""])

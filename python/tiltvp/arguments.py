@@ -24,6 +24,7 @@ __all__ = [
     "number_from",
     "pair_from",
     "path_from",
+    "refuse_single",
     "refuse_uncallable",
     "refuse_unless",
     "shaped_from",
@@ -59,7 +60,7 @@ def shaped_from(values: Any, name: str, *shape: int | None) -> NDArray[np.float6
 
 def each_from(values: Any, name: str, has: str, kind: str, *, or_none: bool = False) -> list[Any]:
     """Several things of one kind, which an attribute tells. Raises `InvalidInputError` with the number of another."""
-    refuse_unless(values, Iterable, name, f"several {kind}")
+    refuse_single(values, name, f"several {kind}")
     found = list(values)
     for number, one in enumerate(found):
         if not (hasattr(one, has) or (or_none and one is None)):
@@ -95,8 +96,9 @@ def size_from(size: tuple[int, int], name: str) -> tuple[int, int]:
 
 def number_from(value: float, name: str) -> float:
     """A real number, which may be NaN; texts, bools and complex numbers are none. Raises `InvalidInputError`."""
-    if not isinstance(value, str | bytes | bool | np.bool_ | complex) and not np.ma.is_masked(value):
-        with suppress(TypeError, ValueError, OverflowError):
+    with suppress(TypeError, ValueError, OverflowError):
+        array = np.asarray(value)
+        if array.ndim == 0 and array.dtype.kind in "iufO" and not np.ma.is_masked(value):
             return float(value)
     raise InvalidInputError(f"{name} = {value!r}, expected a number")
 
@@ -112,6 +114,13 @@ def refuse_unless(value: object, kinds: type | UnionType, name: str, expected: s
     """Raises `InvalidInputError` for what is of none of the kinds."""
     if not isinstance(value, kinds):
         raise InvalidInputError(f"{name}: {type(value).__name__}, expected {expected}")
+
+
+def refuse_single(values: object, name: str, expected: str) -> None:
+    """Raises `InvalidInputError` for what is not several things, nor an array without dimensions."""
+    if getattr(values, "ndim", 1) == 0:
+        raise InvalidInputError(f"{name}: an array without dimensions, expected {expected}")
+    refuse_unless(values, Iterable, name, expected)
 
 
 def refuse_uncallable(value: object, name: str, expected: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
-from tiltvp.arguments import flag_from, number_from, refuse_unless, shaped_from
+from tiltvp.arguments import flag_from, number_from, refuse_single, refuse_unless, shaped_from
 from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
@@ -206,7 +206,7 @@ def resolve(
     corners = _checked(features)
     if common_from_camera is None:
         common_from_camera = [np.eye(3)] * len(corners)
-    refuse_unless(common_from_camera, Iterable, "common_from_camera", "several rotations (3, 3)")
+    refuse_single(common_from_camera, "common_from_camera", "several rotations (3, 3)")
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
     return _core.resolve_corners(corners, list(common_from_camera), known, alignment)
 
@@ -236,7 +236,7 @@ def poses(
 
 
 def _checked(features: Iterable[CornerFeature]) -> list[CornerFeature]:
-    refuse_unless(features, Iterable, "features", "several CornerFeature")
+    refuse_single(features, "features", "several CornerFeature")
     found = list(features)
     for one in found:
         refuse_unless(one, CornerFeature, "feature", "a CornerFeature, as fit gives it")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp._core import CornerEstimate
-from tiltvp.arguments import each_from, refuse_unless, shaped_from
+from tiltvp.arguments import each_from, refuse_single, refuse_unless, shaped_from
 from tiltvp.corner_boxes import join_boxes
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
@@ -73,7 +73,7 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
 def _each(estimates: Iterable[tuple[float, str, CornerEstimate]]) -> Iterator[tuple[float, str, CornerEstimate]]:
     """Each frame's, as it should be. Raises `InvalidInputError` with the number of another."""
     expected = "(time_s, file, CornerEstimate)"
-    refuse_unless(estimates, Iterable, "estimates", f"several {expected}")
+    refuse_single(estimates, "estimates", f"several {expected}")
     for number, one in enumerate(estimates):
         name = f"estimates[{number}]"
         if not isinstance(one, Sequence) or len(one) != 3:

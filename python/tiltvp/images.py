@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp import _core
-from tiltvp.arguments import path_from, refuse_unless
+from tiltvp.arguments import path_from, refuse_single, refuse_unless
 from tiltvp.decoder_words import quietly
 from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
 from tiltvp.files import read_bytes, write_whole
@@ -111,7 +111,7 @@ def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
 
 def _named(images: Iterable[ArrayLike]) -> Iterator[tuple[str, ArrayLike]]:
     """Images with the names that messages call them."""
-    refuse_unless(images, Iterable, "images", "several images")
+    refuse_single(images, "images", "several images")
     if isinstance(images, str | bytes):
         raise InvalidInputError(f"images = {images!r}, expected several images, as tiltvp.read_image reads them")
     return ((f"images[{number}]", image) for number, image in enumerate(images))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltvp._core import MOST_LANDMARKS, LineTracker
-from tiltvp.arguments import each_from, number_from, refuse_uncallable, refuse_unless
+from tiltvp.arguments import each_from, number_from, refuse_single, refuse_uncallable, refuse_unless
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.images import gray_from
 from tiltvp.lines import LineExtractor
@@ -105,7 +105,7 @@ def see_lines(
     image, what the robot did since the one before. The motion of a frame that cannot be used is added to that of the
     next. Raises `InvalidInputError` if there are more images than motions.
     """
-    refuse_unless(images, Iterable, "images", "several images")
+    refuse_single(images, "images", "several images")
     refuse_unless(extractor, LineExtractor, "extractor", "a LineExtractor")
     refuse_uncallable(tilt, "tilt", "what tells the lean of an image")
     # Motions without any distance tell turns only.

@@ -263,9 +263,9 @@ fn mirror_from(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     convert::taken(value, "mirror", "True or False")
 }
 
-/// A number, or numbers in order. A truth value is neither.
+/// A number, or numbers in order. What is no real number is neither.
 fn parameter(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Parameter> {
-    if convert::is_truth(value) {
+    if convert::is_no_real(value) {
         return Err(invalid(format!("{name}: {value}, expected one number or an array (N,)")));
     }
     match value.extract::<f64>() {

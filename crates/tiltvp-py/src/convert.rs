@@ -208,7 +208,7 @@ impl<'py> FromPyObject<'_, 'py> for Number {
     const INPUT_TYPE: pyo3::inspect::PyStaticExpr = <f64 as FromPyObject<'_, 'py>>::INPUT_TYPE;
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let number = value.extract().ok().filter(|_| !is_truth(&value));
+        let number = value.extract().ok().filter(|_| !is_no_real(&value));
         Ok(Self(number.ok_or_else(|| shown(&value))))
     }
 }
@@ -248,14 +248,17 @@ impl From<&str> for Word {
     }
 }
 
-/// How a refusal shows a value.
+/// How a refusal shows a value: what it is where it does not fit a line, as those of images do not.
 pub(crate) fn shown(value: &Bound<'_, PyAny>) -> String {
-    value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string())
+    let look = value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string());
+    if look.len() > LONGEST_LOOK || look.contains('\n') { describe(value) } else { look }
 }
 
-/// Whether a value is True or False, which Python would take for 1 and 0, and which are no numbers here.
-pub(crate) fn is_truth(value: &Bound<'_, PyAny>) -> bool {
-    !value.is_exact_instance_of::<PyFloat>() && value.extract::<bool>().is_ok()
+/// Whether a value is no real number, though Python would make one of it: True and False, and of NumPy also complex numbers and texts.
+pub(crate) fn is_no_real(value: &Bound<'_, PyAny>) -> bool {
+    let is_of_numpy = || value.getattr("dtype").and_then(|dtype| dtype.getattr("kind")?.extract::<String>());
+    !value.is_exact_instance_of::<PyFloat>()
+        && (value.extract::<bool>().is_ok() || is_of_numpy().is_ok_and(|kind| !"iufO".contains(&kind)))
 }
 
 /// A number that the type can hold.
@@ -263,7 +266,7 @@ pub(crate) fn number<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &s
 where
     T: for<'a> FromPyObject<'a, 'py>,
 {
-    if is_truth(value) {
+    if is_no_real(value) {
         return Err(invalid(format!("{name} = {value}, expected {expected}")));
     }
     taken(value, name, expected)
@@ -276,6 +279,9 @@ where
 {
     value.extract().map_err(|_| invalid(format!("{name} = {}, expected {expected}", shown(value))))
 }
+
+/// Of a whole number that no float can hold: there are no shorter ones than 309 digits.
+const LONGEST_LOOK: usize = 500;
 
 /// How many threads were asked for, but no more than four for each core: no answer depends on it, and thousands take longer to start
 /// than all work.
@@ -328,7 +334,10 @@ pub(crate) fn object<'a, 'py, T: PyTypeCheck>(
 /// What a value is, for a message.
 pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     match value.cast::<PyUntypedArray>() {
-        Ok(array) => format!("shape {:?} of {}", array.shape(), array.dtype()),
+        Ok(array) => {
+            let hidden = if is_masked(value).unwrap_or(false) { " with masked values" } else { "" };
+            format!("shape {:?} of {}{hidden}", array.shape(), array.dtype())
+        }
         Err(_) => value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string()),
     }
 }

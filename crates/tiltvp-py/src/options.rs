@@ -95,6 +95,9 @@ fn to_value(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if is_sequence || value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0) {
         return array(value, is_sequence)?.map_or_else(look, Ok);
     }
+    if convert::is_no_real(value) {
+        return look();
+    }
     if let Ok(whole) = value.call_method0("__index__").and_then(|whole| whole.extract()) {
         return Ok(Value::Int(whole));
     }

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltvp.arguments import refuse_unless
+from tiltvp.arguments import refuse_single
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class Frames:
     def _these(self, numbers: Sequence[int]) -> list[int]:
         """Numbers of frames that are there. Raises `InvalidInputError`."""
         count = self.count or 0
-        refuse_unless(numbers, Iterable, "numbers", "several numbers of frames")
+        refuse_single(numbers, "numbers", "several numbers of frames")
         found = list(numbers)
         for one in found:
             if not (isinstance(one, int | np.integer) and 0 <= one < count):

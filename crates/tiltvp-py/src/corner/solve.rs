@@ -71,7 +71,7 @@ pub(crate) fn solve_corners(
     let rays = [rows(x_ray, "x_ray")?, rows(y_ray, "y_ray")?, rows(z_ray, "z_ray")?];
     // An array of one would pass for a number, with a warning.
     let many = gamma_rad.getattr("ndim").and_then(|ndim| ndim.extract::<usize>()).is_ok_and(|ndim| ndim > 0);
-    let gamma = match (!many && !convert::is_truth(gamma_rad)).then(|| gamma_rad.extract::<f64>()) {
+    let gamma = match (!many && !convert::is_no_real(gamma_rad)).then(|| gamma_rad.extract::<f64>()) {
         Some(Ok(gamma)) => vec![gamma; vertex.len()],
         _ => convert::vector(gamma_rad, "gamma_rad")?,
     };
