@@ -212,7 +212,12 @@ def test_pipes_of_tilts_and_links_in_a_circle_are_refused(
     [
         ("name,environment,tilt_x_deg,tilt_z_deg\nhall,é,0,0\n".encode("latin1"), "not UTF-8"),
         (b"name,environment,tilt_x_deg,tilt_z_deg\nhall,house,0,0,5\n", "line 2: 5 cells, expected 4"),
-        (b"name,tilt_x_deg,tilt_z_deg\nhall,0,0\n", "line 2: KeyError('environment'), expected the columns name"),
+        (b"name,tilt_x_deg,tilt_z_deg\nhall,0,0\n", "line 1: no column 'environment', expected name"),
+        (b"name,environment,tilt_x_deg,tilt_z_deg\nhall,house,up,0\n", "line 2: tilt_x_deg = 'up', expected a finite"),
+        (
+            b"name,environment,tilt_x_deg,tilt_z_deg\nhall,a,0,0\nhall,b,0,0\n",
+            "line 3: name 'hall' again, expected one",
+        ),
         (None, "cannot be read (No such file or directory), expected an index of panoramas"),
     ],
 )

@@ -135,7 +135,7 @@ def test_numbers_that_are_not_nothing_are_not_shown_as_0(run: Run) -> None:
 
 @pytest.mark.parametrize(
     ("row", "problem"),
-    [("third,house,nan,0", "not finite"), ("third,house,0,inf", "not finite"), ("first,other,0,0", "first once more")],
+    [("third,a,nan,0", "a finite number"), ("third,a,0,inf", "a finite number"), ("first,b,0,0", "'first' again")],
 )
 def test_rows_of_an_index_that_tell_no_panorama_are_named(panoramas: Path, row: str, problem: str) -> None:
     index = panoramas / "INDEX.csv"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -76,26 +75,28 @@ def read_panorama_index(directory: str | os.PathLike[str]) -> list[Panorama]:
 def read_index(
     directory: str | os.PathLike[str], columns: Sequence[str], make: Callable[[dict[str, str], Path], Item]
 ) -> list[Item]:
-    """`make(row, folder)` of each row of a folder's `INDEX.csv`; what it cannot read is named with file and line.
+    """`make(row, folder)` of each row of a folder's `INDEX.csv`. Raises `InvalidInputError` with file and line.
 
-    Angles (`..._deg`) that are not finite cannot, nor names that were there before.
+    Angles (`..._deg`) are finite, and names are those of one row each.
     """
     index = Path(directory) / "INDEX.csv"
     table = CsvFile(index, "an index of panoramas")
+    for column in columns:
+        if column not in table.header:
+            raise InvalidInputError(f"{table.where(1)}: no column {column!r}, expected {', '.join(columns)}")
     items: list[Item] = []
     names: set[str] = set()
     for line, cells in table.rows():
         row = dict(zip(table.header, cells, strict=True))
-        try:
-            if not all(math.isfinite(float(row[key])) for key in columns if key.endswith("_deg")):
-                raise ValueError("an angle that is not finite")
-            if row["name"] in names:
-                raise ValueError(f"{row['name']} once more")
-            names.add(row["name"])
-            items.append(make(row, index.parent))
-        except (KeyError, ValueError) as error:
-            expected = f"the columns {', '.join(columns)}"
-            raise InvalidInputError(f"{table.where(line)}: {error!r}, expected {expected}") from error
+        for column in columns:
+            if column.endswith("_deg"):
+                table.number(line, column, row[column])
+        if row["name"] in names:
+            raise InvalidInputError(
+                f"{table.where(line)}: name {row['name']!r} again, expected one row for each panorama"
+            )
+        names.add(row["name"])
+        items.append(make(row, index.parent))
     if not items:
         raise InvalidInputError(f"{index}: no rows, expected a panorama in each")
     return items
