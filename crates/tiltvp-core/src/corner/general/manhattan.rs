@@ -20,7 +20,7 @@ const NEAR_RAD: f64 = 0.004_36;
 pub(super) fn manhattan(lines: &[StraightEdge], down: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let down = down.normalize();
     let longest = longest_first(lines);
-    let upright: Vec<StraightEdge> =
+    let upright: Vec<Voter> =
         longest.iter().filter(|line| line.normal.dot(&down).abs() <= DOWN_SINE).copied().collect();
     let tried = &upright[..upright.len().min(TRIED)];
     let meetings = tried.iter().enumerate().flat_map(|(k, line)| {
@@ -29,7 +29,7 @@ pub(super) fn manhattan(lines: &[StraightEdge], down: &Vector3<f64>) -> Option<M
     let verticals = meetings
         .map(|meeting| meeting * meeting.dot(&down).signum())
         .filter(|vertical| vertical.cross(&down).norm() <= DOWN_SINE);
-    let vertical = most_voted(verticals, |vertical| upright.iter().map(|line| vote(line, vertical)).sum())?;
+    let vertical = most_voted(verticals, |vertical| upright.iter().map(|line| line.vote(vertical)).sum())?;
     about(&longest, &vertical)
 }
 
@@ -38,26 +38,37 @@ pub(super) fn manhattan_about(lines: &[StraightEdge], vertical: &Vector3<f64>) -
     about(&longest_first(lines), vertical)
 }
 
-fn longest_first(lines: &[StraightEdge]) -> Vec<StraightEdge> {
-    let mut longest = lines.to_vec();
-    longest.sort_by(|a, b| b.length_px.total_cmp(&a.length_px));
-    longest
+/// A line that votes for directions.
+#[derive(Debug, Clone, Copy)]
+struct Voter {
+    normal: Vector3<f64>,
+    /// The sine of the angle by which it misses a direction for which it has half a vote.
+    half: f64,
 }
 
-fn about(longest: &[StraightEdge], vertical: &Vector3<f64>) -> Option<Matrix3<f64>> {
-    let level: Vec<StraightEdge> =
+impl Voter {
+    /// How much it says for a direction, from 0 to 1.
+    fn vote(&self, direction: &Vector3<f64>) -> f64 {
+        (1.0 + (self.normal.dot(direction) / self.half).powi(2)).recip()
+    }
+}
+
+fn longest_first(lines: &[StraightEdge]) -> Vec<Voter> {
+    let mut longest = lines.to_vec();
+    longest.sort_by(|a, b| b.length_px.total_cmp(&a.length_px));
+    let voter = |line: &StraightEdge| Voter { normal: line.normal, half: NEAR_RAD.hypot(line.sigma_rad) };
+    longest.iter().map(voter).collect()
+}
+
+fn about(longest: &[Voter], vertical: &Vector3<f64>) -> Option<Matrix3<f64>> {
+    let level: Vec<Voter> =
         longest.iter().filter(|line| line.normal.dot(vertical).abs() > 2.0 * NEAR_RAD).copied().collect();
     let axes = level.iter().take(TRIED).filter_map(|line| vertical.cross(&line.normal).try_normalize(NEAR_RAD));
     let axis = most_voted(axes, |axis| {
         let other = axis.cross(vertical);
-        level.iter().map(|line| vote(line, axis).max(vote(line, &other))).sum()
+        level.iter().map(|line| line.vote(axis).max(line.vote(&other))).sum()
     })?;
     Some(Matrix3::from_columns(&[axis, *vertical, axis.cross(vertical)]))
-}
-
-/// How much a line says for a direction, from 0 to 1.
-fn vote(line: &StraightEdge, direction: &Vector3<f64>) -> f64 {
-    (1.0 + (line.normal.dot(direction) / NEAR_RAD.hypot(line.sigma_rad)).powi(2)).recip()
 }
 
 fn most_voted(
