@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::askew::askew;
-use super::common_attitude::{CommonAttitude, REACH_SINE, StraightEdge, common_attitude};
+use super::common_attitude::{CommonAttitude, REACH_SINE, StraightEdge, common_attitude, common_attitude_amid_others};
 use super::manhattan::{manhattan, manhattan_about};
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
@@ -68,7 +68,7 @@ fn by_own_lines(lines: &[StraightEdge], common: &CommonAttitude, rival: &CommonA
         miss <= others_miss || own.cross(&others).norm() <= REACH_SINE
     };
     let own: Vec<StraightEdge> = lines.iter().filter(is_own).copied().collect();
-    let refined = common_attitude(&own, &common.camera_from_object);
+    let refined = common_attitude_amid_others(&own, &common.camera_from_object);
     refined.map_or(*common, |refined| CommonAttitude { support: common.support, ..refined })
 }
 

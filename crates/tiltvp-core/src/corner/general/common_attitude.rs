@@ -20,8 +20,7 @@ const START_SIGMA_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// How far from the direction of its axis an edge may pass at first: the sine of 2 degrees.
 pub(super) const REACH_SINE: f64 = 0.0349;
 
-/// Edges that miss their axis by this many standard deviations count half (Cauchy weights; 2.4 has 95 % efficiency), and
-/// in the end a quarter.
+/// Edges that miss their axis by this many standard deviations count half (Cauchy weights; 2.4 has 95 % efficiency).
 pub(super) const HALF_SIGMAS: f64 = 2.0;
 
 /// How far edges miss their axes at least, in the standard deviations that they should have: a tenth of a pixel at either
@@ -111,15 +110,24 @@ pub(crate) struct SharedAxes<'a> {
 ///
 /// An edge along an axis `a` has `normal . a = 0`. The scatter of the edges is that which they show.
 pub(crate) fn common_attitude(lines: &[StraightEdge], start: &Matrix3<f64>) -> Option<CommonAttitude> {
+    by_weights(lines, start, 1)
+}
+
+/// The same where edges of other things are many: in the end they have hardly any pull (Geman and McClure's weights).
+pub(super) fn common_attitude_amid_others(lines: &[StraightEdge], start: &Matrix3<f64>) -> Option<CommonAttitude> {
+    by_weights(lines, start, 2)
+}
+
+/// By Cauchy's weights, and in the later steps by this power of them; the covariance is of Cauchy's, and of edges that scatter as
+/// they should at least.
+fn by_weights(lines: &[StraightEdge], start: &Matrix3<f64>, power: i32) -> Option<CommonAttitude> {
     let mut rotation = *start;
     let mut scatter = 1.0;
     for step in 0..=STEPS {
         let mut information = Matrix3::from_diagonal_element(START_SIGMA_RAD.powi(-2));
         let mut pull = rotation_from(start, &rotation) * START_SIGMA_RAD.powi(-2);
-        // Cauchy's weights find the attitude from afar; squared, as of Geman and McClure (1985), they leave other things'
-        // edges hardly any pull. The covariance is of Cauchy's, and of edges that scatter as they should at least.
         let last = step == STEPS;
-        let power = if last || step <= STEPS / 2 { 1 } else { 2 };
+        let power = if last || step <= STEPS / 2 { 1 } else { power };
         if last {
             scatter = f64::max(scatter, 1.0);
         }
