@@ -251,8 +251,8 @@ def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.Capture
         CornerExperiment(frames=1)
 
 
-def test_the_corner_of_one_grey_camera_may_be_along_the_walls() -> None:
-    """The cuboid stands askew in the room, so that its yaw is no error of a corner there."""
+def test_the_corner_of_one_grey_camera_may_be_along_the_walls_and_its_upright_edge_go_up() -> None:
+    """The cuboid stands askew in the room, so that its yaw is no error of a corner there; nor is the sense of an edge."""
     sequence = CornerScene("cuboid").sequence(12, 8401, 2)
     poses = sequence.poses_at(sequence.times_s)
     cuboid = [pose[:3, :3].T @ sequence.corners[sequence.corner].world_from_object for pose in poses]
@@ -260,7 +260,9 @@ def test_the_corner_of_one_grey_camera_may_be_along_the_walls() -> None:
     walls = [pose[:3, :3].T @ along for pose in poses]
     off = [np.degrees(np.arccos(0.5 * (np.trace(a.T @ b) - 1.0))) % 90.0 for a, b in zip(cuboid, walls, strict=True)]
     assert 20.0 < off[0] < 70.0
-    table = compare_inertial(sequence, {IMAGE: cuboid, "image, one grey camera": [*cuboid[:6], *walls[6:]]})
+    named = [*cuboid[:6], *walls[6:]]
+    up = [attitude @ np.diag([1.0, -1.0, -1.0]) for attitude in named]
+    table = compare_inertial(sequence, {IMAGE: cuboid, "image, one grey camera": [*up[:3], *named[3:9], *up[9:]]})
     errors = table.filter(pl.col("method").str.starts_with("image")).select("roll", "pitch", "yaw").to_numpy()
     assert errors.shape == (24, 3)
     assert np.abs(errors).max() < 1e-6

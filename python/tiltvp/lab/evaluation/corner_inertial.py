@@ -49,6 +49,9 @@ _INTEGRAL_SHARE: Final = 0.05
 _WALLS: Final = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
 """From such a frame along a room's walls to the world's."""
 
+_OVER: Final = np.diag((1.0, -1.0, -1.0))
+"""From a corner whose upright edge goes up to the names of one whose edge goes down."""
+
 
 class InertialLooks:
     """What estimators make of a sequence of the coloured cuboid that are told down and turns frame by frame
@@ -86,8 +89,8 @@ def compare_inertial(
     these, at the frames; `ComplementaryFilter` with `IMAGE` as its reference, and `CONVENTIONAL`, filters of
     accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
     know no yaw; each has the time constant that suits the truth best. The level edges of a corner without colours have
-    no names, so that the yaw of one grey camera is up to quarter turns, and its corner is the cuboid's or one along the
-    walls: of both the nearer counts. Angles are those of the board that holds the
+    no names, so that the yaw of one grey camera is up to quarter turns, its upright edge goes down or up, and its corner
+    is the cuboid's or one along the walls: of both the nearer counts. Angles are those of the board that holds the
     cameras, x forward and z up (ROS REP 103). Raises `MissingExtraError` where the package is missing,
     `InvalidInputError` where no frame has an attitude of `IMAGE`.
     """
@@ -104,8 +107,12 @@ def compare_inertial(
     for method, seen in by_time.items():
         if seen:
             frames = np.array(list(seen))
-            images = np.stack([FORWARD @ a.T @ FORWARD.T for a in seen.values()])
+            objects = np.stack(list(seen.values()))
             poses = sequence.poses_at(frames)
+            if method.startswith(_GRAY):
+                goes_up = np.einsum("nj,nj->n", objects[:, :, 1], poses[:, 2, :3]) > 0.0
+                objects[goes_up] = objects[goes_up] @ _OVER
+            images = np.einsum("ij,nkj,lk->nil", FORWARD, objects, FORWARD)
             at_frames = _board_angles(_level(poses, corner.world_from_object))
             walls = _board_angles(_level(poses, _WALLS))[:, 2] if method.startswith(_GRAY) else None
             tables.append(_errors(method, frames, _board_angles(images), at_frames, walls))
