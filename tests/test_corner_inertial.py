@@ -28,7 +28,7 @@ from tiltvp.synth import Laboratory, StereoSequence, zed_cameras
 @pytest.fixture(scope="module")
 def sequence() -> StereoSequence:
     left, right = zed_cameras()
-    return StereoSequence(Laboratory(5), left=left, right=right, frames=6, seed=5, samples=1)
+    return StereoSequence(Laboratory(5), left=left, right=right, frames=60, seed=5, samples=1)
 
 
 def samples_of(sequence: StereoSequence, seed: int) -> InertialSamples:
@@ -51,27 +51,51 @@ def test_a_frame_of_a_long_record_takes_no_longer_than_one_of_a_short() -> None:
 
 
 @pytest.mark.slow
-def test_turns_and_down_have_covariances_that_hold() -> None:
-    """Of ten sensors, each with its own bias: mean squared errors by their covariances, of 3 and of 2."""
+def test_turns_have_covariances_that_hold() -> None:
+    """Of ten sensors, each with its own bias: mean squared errors by their covariances, of 3 numbers."""
     left, right = zed_cameras()
-    turns, downs = [], []
+    turns = []
     sequence = StereoSequence(Laboratory(5), left=left, right=right, frames=60, seed=8, samples=1)
     poses = sequence.poses[:, :3, :3]
     for seed in range(10):
         samples = samples_of(sequence, seed)
         for k in range(1, len(poses)):
-            known = samples.known(sequence.times_s[k - 1], sequence.times_s[k])
-            turn, covariance = known["gyro"]
+            turn, covariance = samples.known(sequence.times_s[k - 1], sequence.times_s[k])["gyro"]
             off = turn.T @ poses[k - 1].T @ poses[k]
             error = 0.5 * np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]])
             turns.append(error @ np.linalg.solve(covariance, error))
-            if known["gravity"] is not None:
-                down, sigma = known["gravity"]
-                downs.append((np.linalg.norm(np.cross(down, poses[k].T @ [0, 0, -1])) / sigma) ** 2)
     assert 0.3 < np.mean(turns) < 4.5
     assert np.quantile(turns, 0.99) < 16
-    assert len(downs) > 100
-    assert np.mean(downs) < 3
+
+
+@pytest.mark.slow
+def test_down_is_as_good_as_it_says_however_short_the_record() -> None:
+    """Of hands that sway slower than the record is long, and of those that sway faster, from its beginning on."""
+    left, right = zed_cameras()
+    expected = {0.7: (4.0, 0.6), 2.0: (2.5, 0.8), 20.0: (1.0, 1.0)}
+    off_deg: dict[float, list[float]] = {record_s: [] for record_s in expected}
+    sigmas: dict[float, list[float]] = {record_s: [] for record_s in expected}
+    for period_s, seed in ((15.0, 0), (15.0, 1), (40.0, 2)):
+        sequence = StereoSequence(Laboratory(5), left=left, right=right, frames=600, seed=seed, period_s=period_s)
+        imu = sequence.imu(seed=seed)
+        for record_s in expected:
+            for begin_s in np.arange(0.0, 19.9 - min(record_s, 19.0), 3.0):
+                of = (imu.times_s >= begin_s) & (imu.times_s <= begin_s + record_s)
+                samples = InertialSamples(imu.times_s[of], imu.rates_rad_s[of], imu.forces_m_s2[of])
+                for now_s in begin_s + record_s * np.array([0.0, 0.3, 0.5, 0.9]):
+                    known = samples.known(None, now_s)["gravity"]
+                    if known is None:
+                        sigmas[record_s].append(np.nan)
+                        continue
+                    down = -sequence.poses_at([now_s])[0, 2, :3]
+                    off_deg[record_s].append(np.degrees(np.linalg.norm(np.cross(known[0], down))))
+                    sigmas[record_s].append(off_deg[record_s][-1] / np.degrees(known[1]))
+    for record_s, (rms_deg, told) in expected.items():
+        assert np.mean(np.isfinite(sigmas[record_s])) >= told, record_s
+        assert np.sqrt(np.mean(np.square(off_deg[record_s]))) < rms_deg, record_s
+        # Half of what directions make that are off as they say is 1.2; 99.9 % are within 3.7.
+        assert 0.3 < np.nanmedian(sigmas[record_s]) < 1.2, record_s
+        assert np.nanmax(sigmas[record_s]) < 3.7, record_s
 
 
 @pytest.mark.slow

@@ -252,7 +252,7 @@ def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.Capture
 
 
 def test_the_corner_of_one_grey_camera_may_be_along_the_walls_and_its_upright_edge_go_up() -> None:
-    """The cuboid stands askew in the room, so that its yaw is no error of a corner there; nor is the sense of an edge."""
+    """The cuboid stands askew in the room, so that its yaw is no error of a corner there, nor an edge's sense."""
     sequence = CornerScene("cuboid").sequence(12, 8401, 2)
     poses = sequence.poses_at(sequence.times_s)
     cuboid = [pose[:3, :3].T @ sequence.corners[sequence.corner].world_from_object for pose in poses]

@@ -36,9 +36,15 @@ _LEVEL_RAD: Final = float(np.radians(0.5))
 """Standard deviation of down by a sensor at rest: a bias of 5 mg is 0.3 degrees, and as much of the mounting."""
 _STEADY_RAD: Final = float(np.radians(5.0))
 """Down with a larger standard deviation is not told: the sensor moves."""
-_SWAY_S: Final = 0.5
-"""How long before and after a frame accelerations are averaged: a hand sways for a second and more, and what stays the
-same for less than that passes for gravity."""
+_MEAN_S: Final = 4.0
+"""How long before and after a frame accelerations are averaged. Where a sensor stays about its place their mean is as
+small as the time is long: of a hand that sways in 15 s down is off by 3.5 degrees rms with 0.5 s, by 0.8 with 4."""
+_SWAY_S: Final = 1.6
+"""The mean of a sway is its acceleration times this, over the time of the mean. With it the errors of simulated hands
+that sway in 15 and 40 s are, with means of 0.7 to 8 s, at most 3.1 standard deviations."""
+_NODES_MAX: Final = 400
+"""Samples of a mean, neighbours averaged where there are more, which bounds the time: 20 ms apart, a tenth of a
+tremor's period."""
 _GAP_S: Final = 0.1
 """The longest time between two samples, or a sample and a frame, over which turns and down are told: at 2 rad/s the
 sensor turns by 0.2 rad unseen."""
@@ -125,9 +131,10 @@ class InertialSamples:
         `before_s` is the time of the frame before, None where there is none. `camera_from_sensor` (3, 3) takes vectors
         of the sensor's axes to the camera's; None where these are the same. `gyro` is the product of the rotations by
         the rates, each held half-way to its neighbours, with the covariance of noise, bias and scale; None where
-        samples do not cover the time. `gravity` is the mean acceleration within half a second, carried to the
-        frame by the rates; its standard deviation has the sensor's bias, the scatter of accelerations and how far their
-        length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved, and
+        samples do not cover the time. `gravity` is the mean acceleration within 4 s, carried to the
+        frame by the rates; its standard deviation has the sensors' biases, the scatter of accelerations over the time
+        that there is, and how far their mean's length is from gravity's. It holds for a sensor that stays about its
+        place. None where that is above 5 degrees, as of a sensor that is moved, and
         where no sample is near the frame: those beyond a gap of 0.1 s tell nothing of it.
 
         Raises `InvalidInputError` for what is no number, `CalibrationError` for what is no rotation.
@@ -173,26 +180,40 @@ class InertialSamples:
 
         if self.accelerations_m_s2 is None:
             return None
-        about = self._about(now_s - _SWAY_S, now_s + _SWAY_S)
-        times_s, rates, forces = self.times_s[about], self.rates_rad_s[about], self.accelerations_m_s2[about]
+        about = self._about(now_s - _MEAN_S, now_s + _MEAN_S)
+        times_s = self.times_s[about]
         nearest = int(np.argmin(np.abs(times_s - now_s)))
         # Turns are known since the last gap and up to the next one.
         unbroken = np.cumsum(np.diff(times_s, prepend=times_s[:1]) > _GAP_S)
-        near = np.flatnonzero((np.abs(times_s - now_s) <= _SWAY_S) & (unbroken == unbroken[nearest]))
+        near = np.flatnonzero((np.abs(times_s - now_s) <= _MEAN_S) & (unbroken == unbroken[nearest]))
         if len(near) < 2 or abs(times_s[nearest] - now_s) > _GAP_S:
             return None
+        times_s, rates, forces = (
+            _thinned(values[about][near]) for values in (self.times_s, self.rates_rad_s, self.accelerations_m_s2)
+        )
         turns = [np.eye(3)]
-        for vector in 0.5 * (rates[near[1:]] + rates[near[:-1]]) * np.diff(times_s[near])[:, None]:
+        for vector in 0.5 * (rates[1:] + rates[:-1]) * np.diff(times_s)[:, None]:
             turns.append(turns[-1] @ cv2.Rodrigues(vector)[0])
-        now = turns[nearest - near[0]] @ cv2.Rodrigues(rates[nearest] * (now_s - times_s[nearest]))[0]
+        nearest = int(np.argmin(np.abs(times_s - now_s)))
+        now = turns[nearest] @ cv2.Rodrigues(rates[nearest] * (now_s - times_s[nearest]))[0]
         # All in the axes at the frame.
-        forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), forces[near])
+        forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), forces)
         mean = forces.mean(axis=0)
         length = float(np.linalg.norm(mean))
-        # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end
-        # it is the square root of two of its root mean square.
         scatter = float(np.sqrt(((forces - mean) ** 2).sum(axis=1).mean() / 3.0)) / GRAVITY_M_S2
-        sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + 2.0 * scatter**2 + (length / GRAVITY_M_S2 - 1.0) ** 2))
+        # Of two directions across.
+        sway_rad = np.sqrt(2.0) * scatter * _SWAY_S / float(times_s[-1] - times_s[0])
+        drift_rad = _BIAS_RAD_S * float(np.mean(times_s) - now_s)
+        sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + sway_rad**2 + drift_rad**2 + (length / GRAVITY_M_S2 - 1.0) ** 2))
         if sigma_rad > _STEADY_RAD:
             return None
         return -(camera_from_sensor @ mean) / length, sigma_rad
+
+
+def _thinned(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """At most `_NODES_MAX` of them, (K,) or (K, 3): means of neighbours."""
+    together = -(-len(values) // _NODES_MAX)
+    firsts = np.arange(0, len(values), together)
+    counts = np.diff(firsts, append=len(values))
+    thinned: NDArray[np.float64] = (np.add.reduceat(values, firsts).T / counts).T
+    return thinned

@@ -89,9 +89,9 @@ def compare_inertial(
     these, at the frames; `ComplementaryFilter` with `IMAGE` as its reference, and `CONVENTIONAL`, filters of
     accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
     know no yaw; each has the time constant that suits the truth best. The level edges of a corner without colours have
-    no names, so that the yaw of one grey camera is up to quarter turns, its upright edge goes down or up, and its corner
-    is the cuboid's or one along the walls: of both the nearer counts. Angles are those of the board that holds the
-    cameras, x forward and z up (ROS REP 103). Raises `MissingExtraError` where the package is missing,
+    no names, so that the yaw of one grey camera is up to quarter turns, its upright edge goes down or up, and its
+    corner is the cuboid's or one along the walls: of both the nearer counts. Angles are those of the board that holds
+    the cameras, x forward and z up (ROS REP 103). Raises `MissingExtraError` where the package is missing,
     `InvalidInputError` where no frame has an attitude of `IMAGE`.
     """
     imu = sequence.imu(seed=seed)
