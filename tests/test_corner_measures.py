@@ -19,7 +19,7 @@ from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
 from tiltvp.lab.evaluation.corner_inertial import IMAGE, compare_inertial, conventional_angles
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks
-from tiltvp.lab.evaluation.corner_rooms import truth_near
+from tiltvp.lab.evaluation.corner_rooms import lengths_off, truth_near
 from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, fresh_rooms
 from tiltvp.lab.evaluation.corners import CornerExperiment, measure_corners, summarise_corners, summarise_rooms
 from tiltvp.lab.plots.corner_poses import pose_plot
@@ -154,7 +154,7 @@ def test_rooms_are_counted_that_have_a_pose_in_nearly_all_frames() -> None:
             found = frame >= {1: 1, 5: 2}.get(number, 0)
             seen = {"corner": 4, "attitude_deg": 0.1, "position_m": 0.002, "nees": 30.0 if number == 0 else 5.0}
             row = {"scene": room.name, "method": "general"}
-            told = {"surface": 4.0 if frame == 19 else 0.0} | seen
+            told = {"surface": 4.0 if frame == 19 else 0.0, "lengths": 3, "lengths_off": int(frame == 9)} | seen
             rows.append(row | {"found": found} | (told if found else {"corner": -1}))
             # One camera's NEES is of three numbers.
             alone = {"method": "general, one camera", "attitude_deg": 0.2, "nees": 20.0 if number == 2 else 3.0}
@@ -171,6 +171,8 @@ def test_rooms_are_counted_that_have_a_pose_in_nearly_all_frames() -> None:
     assert (of_all["frames"], of_all["listed"]) == (120, 117)
     assert of_all["% off surface"] == pytest.approx(100 * 6 / 117)
     assert (of_all["median deg"], of_all["listed median mm"]) == (0.1, 2.0)
+    assert (of_all["lengths"], of_all["% lengths off"]) == (3 * 117, pytest.approx(100 * 6 / 351))
+    assert (of_all_alone["lengths"], of_all_alone["% lengths off"]) == (0, None)
 
 
 def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> None:
@@ -210,6 +212,19 @@ def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> No
     assert number == -1
     assert np.allclose(truth[:3, :3], over)
     assert np.allclose(truth[:3, 3], own)
+
+
+def test_a_length_is_wrong_whose_edge_leaves_the_surfaces() -> None:
+    """Of edges before a wall 3 m away: one on it, one that leaves it, one that tells no length."""
+    wall = SimpleNamespace(distances=lambda _, bearings: 3.0 / bearings[:, 2])
+    edges = np.array([[1.0, 0.0, 0.0], [0.0, 0.96, -0.28], [0.0, 0.0, 1.0]])
+    pose = SimpleNamespace(vertex_m=np.array([-0.4, 0.2, 3.0]), edges=edges, covariance=1e-6 * np.eye(6))
+    corner = SimpleNamespace(pose=pose, edge_lengths_m=np.array([0.7, 0.6, np.nan]))
+    unplaced = SimpleNamespace(pose=SimpleNamespace(vertex_m=None))
+    assert lengths_off(wall, 0, [corner, unplaced]) == (2, 1)  # type: ignore[arg-type, list-item]
+    # As far off as the vertex may be farther away.
+    pose.covariance = 0.01 * np.eye(6)
+    assert lengths_off(wall, 0, [corner]) == (2, 0)  # type: ignore[arg-type, list-item]
 
 
 def test_a_plot_of_poses_without_a_place_has_none() -> None:

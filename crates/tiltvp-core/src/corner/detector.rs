@@ -270,12 +270,41 @@ impl CornerDetector {
         camera_from_left: &RigidMotion,
         scratch: &mut CornerScratch,
     ) -> [Option<ObservedEnd>; 3] {
-        let (CornerMethod::General(options), Some(memory), Some(vertex_m)) =
-            (&self.options.method, &mut scratch.general, &pose.vertex_m)
-        else {
-            return [None; 3];
+        match (self.observed(image, corner, pose, camera_from_left), &mut scratch.general) {
+            (Some(seen), Some(memory)) => seen_ends(&seen, memory),
+            _ => [None; 3],
+        }
+    }
+
+    /// Whether an image shows an edge of a corner up to where another camera has its end, as far as that is in view. `pose` is of the
+    /// left camera, `camera_from_left` takes it to this one.
+    pub(super) fn shows_end(
+        &self,
+        image: &ImageView<'_>,
+        corner: &CornerFeature,
+        pose: &Hypothesis,
+        camera_from_left: &RigidMotion,
+        (axis, end): (usize, &ObservedEnd),
+        scratch: &mut CornerScratch,
+    ) -> bool {
+        match (self.observed(image, corner, pose, camera_from_left), &mut scratch.general) {
+            (Some(seen), Some(memory)) => seen.shows(axis, end, memory),
+            _ => true,
+        }
+    }
+
+    /// What an image shows of a corner with this pose of the left camera; none for the coloured front end.
+    fn observed<'a>(
+        &'a self,
+        image: &'a ImageView<'a>,
+        corner: &'a CornerFeature,
+        pose: &Hypothesis,
+        camera_from_left: &RigidMotion,
+    ) -> Option<ObservedCorner<'a>> {
+        let (CornerMethod::General(options), Some(vertex_m)) = (&self.options.method, &pose.vertex_m) else {
+            return None;
         };
-        let seen = ObservedCorner {
+        Some(ObservedCorner {
             camera: &self.camera,
             image,
             options,
@@ -284,8 +313,7 @@ impl CornerDetector {
             camera_from_object: camera_from_left.rotation * pose.camera_from_object,
             edges: pose.edges.map(|edge| camera_from_left.rotation * edge),
             vertex_m: camera_from_left.point(vertex_m),
-        };
-        seen_ends(&seen, memory)
+        })
     }
 
     /// The end of an edge of a corner with edges in these directions, in the image that was looked at last with this scratch; hidden

@@ -8,13 +8,22 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.corner_images import CornerEstimate, CornerHypothesis
+from tiltvp.corner_images import BelievedCorner, CornerEstimate, CornerHypothesis
 from tiltvp.synth import SceneCorner, StereoSequence
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["attitude_near", "attitudes_of", "named_near", "own_places", "rotation_vector", "surface_off", "truth_near"]
+__all__ = [
+    "attitude_near",
+    "attitudes_of",
+    "lengths_off",
+    "named_near",
+    "own_places",
+    "rotation_vector",
+    "surface_off",
+    "truth_near",
+]
 
 _SAME_M: Final = 0.08
 """An estimate is of the listed corner that is this near"""
@@ -27,6 +36,15 @@ _PIXEL_RAD: Final = 1.5e-3
 
 _EDGE_WIDTH: Final = 0.005
 """How thick what makes an edge may be, as a share of the distance: rounded edges, joints of boards."""
+
+_OFF_SIGMAS: Final = 3.0
+"""A place of an edge is on no surface that is as many standard deviations from each"""
+
+_OFF_LENGTH: Final = 0.25
+"""and an edge's length is wrong of which this share is on none."""
+
+_PARTS: Final = np.linspace(0.1, 0.97, 12)
+"""Where along edges is looked, between the vertex and the end."""
 
 _BESIDE_M: Final = 1.0
 """Corners that are this near may be of the same piece of furniture, and their edges parallel."""
@@ -56,16 +74,47 @@ def surface_off(sequence: StereoSequence, frame: int, pose: CornerHypothesis) ->
     the standard deviation. Listed or not, a corner of two things that meet in the image alone is on neither.
     """
     assert pose.vertex_m is not None
+    sigma_m = _share_along(pose) * float(np.linalg.norm(pose.vertex_m))
+    return _beside_surface_m(sequence, frame, pose.vertex_m) / sigma_m
+
+
+def lengths_off(sequence: StereoSequence, frame: int, corners: Iterable[BelievedCorner]) -> tuple[int, int]:
+    """How many lengths of edges are told of a frame, and those of which a quarter or more is on no surface: an edge
+    that ends where a line before or behind it crosses it, or that another one goes on in the image alone.
+    """
+    told, off = 0, 0
+    for corner in corners:
+        if (vertex_m := corner.pose.vertex_m) is None:
+            continue
+        share = _share_along(corner.pose)
+        for edge, length_m in zip(corner.pose.edges, corner.edge_lengths_m, strict=True):
+            if not np.isfinite(length_m):
+                continue
+            places = [vertex_m + edge * (length_m * part) for part in _PARTS]
+            away = [_beside_surface_m(sequence, frame, place) / float(np.linalg.norm(place)) for place in places]
+            told += 1
+            off += bool(np.mean(np.array(away) > _OFF_SIGMAS * share) >= _OFF_LENGTH)
+    return told, off
+
+
+def _share_along(pose: CornerHypothesis) -> float:
+    """The standard deviation of how far a vertex is, as a share of that, with that of the edges' own width."""
+    assert pose.vertex_m is not None
     distance = float(np.linalg.norm(pose.vertex_m))
     along = pose.vertex_m / distance
+    return float(np.sqrt(along @ pose.covariance[3:, 3:] @ along)) / distance + _EDGE_WIDTH
+
+
+def _beside_surface_m(sequence: StereoSequence, frame: int, place_m: NDArray[np.float64]) -> float:
+    """How far along its line of sight a place is from the nearest surface seen there, within 2 pixels."""
+    distance = float(np.linalg.norm(place_m))
+    along = place_m / distance
     across = np.linalg.svd(along[None])[2][1:]
     reach = 2.0 * _PIXEL_RAD
     angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles)]) @ across
     bearings = np.concatenate([[along], along + 0.5 * reach * ring, along + reach * ring])
-    surfaces = sequence.distances(frame, bearings)
-    sigma = float(np.sqrt(along @ pose.covariance[3:, 3:] @ along)) + _EDGE_WIDTH * distance
-    return float(np.nanmin(np.abs(surfaces - distance))) / sigma
+    return float(np.nanmin(np.abs(sequence.distances(frame, bearings) - distance)))
 
 
 def truth_near(

@@ -19,6 +19,7 @@ from tiltvp.lab.evaluation.corner_inertial import IMAGE, InertialLooks, compare_
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks, MarkerPose
 from tiltvp.lab.evaluation.corner_rooms import (
     attitude_near,
+    lengths_off,
     own_places,
     rotation_vector,
     surface_off,
@@ -76,7 +77,8 @@ _SCHEMA: Final[dict[str, Any]] = (
     | {"corner": pl.Int64}
     | dict.fromkeys(("attitude_deg", "roll_deg", "pitch_deg", "yaw_deg"), pl.Float64)
     | dict.fromkeys(("position_m", "x_m", "y_m", "z_m", "probability", "nees", "surface", "ms"), pl.Float64)
-    | {"hypotheses": pl.UInt32, "reason": pl.String}
+    | dict.fromkeys(("hypotheses", "lengths", "lengths_off"), pl.UInt32)
+    | {"reason": pl.String}
 )
 
 
@@ -109,7 +111,8 @@ def measure_corners(
     estimate, in whichever of eight ways its axes are named. Where none is near, as the list has none of what
     leans or runs into something else, `corner` is -1, the attitude is compared with that of the
     walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `surface`
-    is how far the vertex is from what is seen there (`surface_off`). Poses by markers have neither. `ms` is the
+    is how far the vertex is from what is seen there (`surface_off`); `lengths` are those of edges that all corners of a
+    room tell, `lengths_off` those that are wrong (`lengths_off`). Poses by markers have neither. `ms` is the
     processor time of one pair. `advance` is called after each frame.
     """
     rows: list[dict[str, Any]] = []
@@ -199,6 +202,8 @@ def summarise_rooms(table: pl.DataFrame, rooms: Sequence[CornerScene]) -> pl.Dat
             pl.col("attitude_deg").quantile(0.95).alias("95 % deg"),
             place_mm.median().alias("listed median mm"),
             place_mm.quantile(0.95).alias("listed 95 % mm"),
+            pl.col("lengths").sum(),
+            (pl.col("lengths_off").sum() / pl.col("lengths").sum()).fill_nan(None).mul(100).alias("% lengths off"),
         )
     )
 
@@ -285,6 +290,7 @@ def _judged(
         number, truth = sequence.corner, sequence.left_from_object(frame)
     else:
         number, truth = truth_near(sequence, frame, pose, places[estimate.object])
+        row |= dict(zip(("lengths", "lengths_off"), lengths_off(sequence, frame, estimate.corners), strict=True))
     error = np.concatenate([
         rotation_vector(truth[:3, :3] @ pose.camera_from_object.T), truth[:3, 3] - pose.vertex_m
     ])  # fmt: skip

@@ -3,13 +3,14 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use crate::camera::Camera;
+use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
 use crate::corner::ray::FittedRay;
-use crate::corner::trace::{RaySearch, trace};
+use crate::corner::trace::{RaySearch, TraceScratch, TracedRay, trace};
 use crate::corner::triangulation::{BearingObservation, triangulate};
-use crate::geometry::{RigidMotion, meeting};
+use crate::geometry::{RigidMotion, meeting, tangent_basis};
 use crate::image::{ImageView, LightTable};
 use crate::segments::Segment;
 
@@ -69,6 +70,36 @@ pub(crate) struct ObservedCorner<'a> {
     pub(crate) vertex_m: Vector3<f64>,
 }
 
+impl ObservedCorner<'_> {
+    /// The edge on a great circle through the vertex, between two angles from there.
+    fn follow(
+        &self,
+        normal: &Vector3<f64>,
+        reach_rad: [f64; 2],
+        share_min: f64,
+        memory: &mut TraceScratch,
+    ) -> Option<TracedRay> {
+        let along = gray_search(self.options, *normal, self.corner.vertex(), reach_rad);
+        let search = RaySearch { share_min, ..along };
+        let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
+        trace(self.camera, &search, SUPPORT_MIN_PX, signal, memory)
+    }
+
+    /// Whether the image shows an edge up to where another one has its end, as far as that is in view.
+    pub(crate) fn shows(&self, axis: usize, end: &ObservedEnd, scratch: &mut GeneralScratch) -> bool {
+        let end = self.vertex_m + self.edges[axis] * end.length_m;
+        let is_in_view = self.camera.project(&end).is_some_and(|pixel| self.camera.contains(&pixel));
+        let (vertex, Some(px_per_rad)) = (self.corner.vertex(), self.camera.px_per_rad(&self.corner.vertex())) else {
+            return true;
+        };
+        let Some(normal) = vertex.cross(&end).try_normalize(1e-6).filter(|_| is_in_view) else { return true };
+        let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
+        let to_rad = vertex.angle(&end) - clear_rad;
+        let last_rad = (to_rad - LAST_PX / px_per_rad).max(clear_rad);
+        self.follow(&normal, [last_rad, to_rad], LAST_SHARE, &mut scratch.trace).is_some()
+    }
+}
+
 /// Least length of an edge, in pixels: that of a segment.
 pub(super) const EDGE_MIN_PX: f64 = 20.0;
 
@@ -86,6 +117,9 @@ const LAST_SHARE: f64 = 0.8;
 
 /// Least length of an edge that agrees with it, in pixels: half of the last pixels.
 const SUPPORT_MIN_PX: f64 = 10.0;
+
+/// The 99.9 % quantile of chi-square of 2: an end that is farther from its edge is none of it.
+const ON_EDGE_CHI_SQUARE: f64 = 13.8;
 
 /// How far apart the lengths from the two images may be, as a share of them: larger ones are ends of different edges.
 const LENGTHS_APART: f64 = 0.06;
@@ -135,25 +169,15 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
         if support == 0 {
             continue;
         }
-        let mut follow = |from_rad: f64, to_rad: f64, share_min: f64| {
-            let along = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
-            let search = RaySearch { share_min, ..along };
-            trace(
-                seen.camera,
-                &search,
-                SUPPORT_MIN_PX,
-                |at, step, out| seen.light.gray_profile(seen.image, at, step, out),
-                memory,
-            )
-        };
         let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
         for (place, (angle, _)) in found.iter().enumerate() {
             let last_rad = (angle - LAST_PX / px_per_rad).max(clear_rad);
             // The last pixels are sooner looked at than all.
-            if follow(last_rad, angle - clear_rad, LAST_SHARE).is_none() {
+            if seen.follow(&normal, [last_rad, angle - clear_rad], LAST_SHARE, memory).is_none() {
                 continue;
             }
-            let Some(whole) = follow(clear_rad, angle - clear_rad, seen.options.guided_min_share) else { continue };
+            let reach = [clear_rad, angle - clear_rad];
+            let Some(whole) = seen.follow(&normal, reach, seen.options.guided_min_share, memory) else { continue };
             // Of lines that meet the edge next to each other the longest.
             let together = found[place..].iter().take_while(|(other, _)| (angle - other) * px_per_rad < SAME_END_PX);
             let Some((_, line)) = together.max_by(|a, b| a.1.length_px().total_cmp(&b.1.length_px())) else { continue };
@@ -178,47 +202,66 @@ pub(crate) fn along(point: &Vector3<f64>, edge: &Vector3<f64>, bearing: &Vector3
     (ahead && length_m > 0.0 && length_m.is_finite()).then_some(length_m)
 }
 
-/// The ends of the edges of a corner with the vertex `vertex_m`, from what both cameras see of them.
+/// The ends of the edges of a corner from what both cameras see of them. An end that both see lies on its edge: where a line
+/// before it hides the rest, the places at which the images show that are not one on the edge.
 pub(crate) fn edge_ends(
     [left, right]: [[Option<ObservedEnd>; 3]; 2],
     left_from_right: &RigidMotion,
-    vertex_m: &Vector3<f64>,
-    vertex_covariance_m2: &Matrix3<f64>,
+    pose: &Hypothesis,
 ) -> [Option<EdgeEnd>; 3] {
+    let Some(vertex_m) = pose.vertex_m else { return [None; 3] };
+    let covariance_m2 = pose.covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let observation = |end: &ObservedEnd, rig_from_camera| BearingObservation {
         bearing: end.bearing,
         covariance: Matrix2::from_diagonal_element(end.sigma_rad * end.sigma_rad),
         rig_from_camera,
     };
-    let mut out = [None; 3];
-    for (out, ends) in out.iter_mut().zip(left.iter().zip(&right)) {
-        *out = match ends {
-            (Some(left), Some(right)) => {
-                let apart = (left.length_m - right.length_m).abs();
-                let both = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
-                triangulate(&both).filter(|_| apart <= LENGTHS_APART * left.length_m.max(right.length_m)).map(|point| {
-                    let reach_m = point.point_m - vertex_m;
-                    let along = reach_m / reach_m.norm();
-                    let variance = along.dot(&((point.covariance_m2 + vertex_covariance_m2) * along));
-                    EdgeEnd { length_m: reach_m.norm(), sigma_m: variance.sqrt(), place_m: Some(point.point_m) }
-                })
+    std::array::from_fn(|axis| match (&left[axis], &right[axis]) {
+        (Some(left), Some(right)) => {
+            let apart = (left.length_m - right.length_m).abs();
+            if apart > LENGTHS_APART * left.length_m.max(right.length_m) {
+                return None;
             }
-            (Some(one), None) => Some(one.alone(vertex_m, vertex_covariance_m2)),
-            (None, Some(one)) => {
-                // The vertex as the right camera has it.
-                let turned = left_from_right.rotation.transpose();
-                let covariance_m2 = turned * vertex_covariance_m2 * turned.transpose();
-                Some(one.alone(&left_from_right.inverse().point(vertex_m), &covariance_m2))
+            let both = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
+            let point = triangulate(&both)?;
+            let (reach_m, spread_m2) = (point.point_m - vertex_m, point.covariance_m2 + covariance_m2);
+            if !lies_on(&pose.edges[axis], &pose.attitude_covariance(), &reach_m, &spread_m2) {
+                return None;
             }
-            (None, None) => None,
-        };
-    }
-    out
+            let along = reach_m / reach_m.norm();
+            let sigma_m = along.dot(&(spread_m2 * along)).sqrt();
+            Some(EdgeEnd { length_m: reach_m.norm(), sigma_m, place_m: Some(point.point_m) })
+        }
+        (Some(one), None) => Some(one.alone(&vertex_m, &covariance_m2)),
+        (None, Some(one)) => {
+            // The vertex as the right camera has it.
+            let turned = left_from_right.rotation.transpose();
+            let covariance_m2 = turned * covariance_m2 * turned.transpose();
+            Some(one.alone(&left_from_right.inverse().point(&vertex_m), &covariance_m2))
+        }
+        (None, None) => None,
+    })
+}
+
+/// Whether a point is on a line through the vertex, by the covariances of the line's direction (a rotation vector) and of how far it is
+/// from there.
+fn lies_on(edge: &Vector3<f64>, turn_rad2: &Matrix3<f64>, reach_m: &Vector3<f64>, spread_m2: &Matrix3<f64>) -> bool {
+    let lever = edge.cross_matrix() * reach_m.dot(edge);
+    let basis = tangent_basis(edge);
+    let spread = basis.transpose() * (spread_m2 + lever * turn_rad2 * lever.transpose()) * basis;
+    let off_m = basis.transpose() * reach_m;
+    spread.try_inverse().is_some_and(|information| off_m.dot(&(information * off_m)) <= ON_EDGE_CHI_SQUARE)
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use nalgebra::{Matrix6, Vector2, Vector6};
+
     use super::*;
+    use crate::camera::{Model, Pinhole};
+    use crate::segments::SegmentDetector;
 
     /// An edge across the line of sight, and edges that run towards the camera and away from it.
     #[test]
@@ -240,5 +283,75 @@ mod tests {
             assert!((found.sigma_m / by_bearing.hypot(by_distance) - 1.0).abs() < 1e-6, "{lean_rad}: {found:?}");
             assert_eq!((found.length_m, found.place_m), (length_m, None));
         }
+    }
+
+    /// A pose before both cameras with edges along x, y and away from them.
+    fn pose(vertex_m: Vector3<f64>) -> Hypothesis {
+        let sigmas = [1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 3e-3];
+        Hypothesis {
+            camera_from_object: Matrix3::identity(),
+            edges: [Vector3::x(), Vector3::y(), Vector3::z()],
+            vertex_m: Some(vertex_m),
+            covariance: Matrix6::from_diagonal(&Vector6::from(sigmas.map(|sigma| sigma * sigma))),
+            probability: 1.0,
+            right_handed: true,
+            misfit: 0.0,
+        }
+    }
+
+    #[test]
+    fn where_a_line_in_front_hides_an_edge_it_does_not_end() {
+        let pose = pose(Vector3::new(-0.2, 0.1, 3.0));
+        let left_from_right =
+            RigidMotion { rotation: Matrix3::identity(), translation_m: Vector3::new(0.12, 0.0, 0.0) };
+        // Where each camera sees the edge x pass an upright line at x = 0.8, so far away.
+        let at = |distance_m: f64| {
+            let seen = |camera_x: f64| {
+                let x = camera_x + (0.8 - camera_x) * 3.0 / distance_m;
+                let reach = Vector3::new(x - camera_x, 0.1, 3.0);
+                let bearing = reach.normalize();
+                Some(ObservedEnd { bearing, sigma_rad: 3e-4, length_m: x + 0.2, distance_m: reach.norm() })
+            };
+            edge_ends([[seen(0.0), None, None], [seen(0.12), None, None]], &left_from_right, &pose)[0]
+        };
+        let end = at(3.0).unwrap();
+        assert!((end.length_m - 1.0).abs() < 1e-9 && end.sigma_m < 0.02, "{end:?}");
+        assert!(end.place_m.is_some());
+        // Within what covariances say of the place along the line of sight, 4 cm, and beyond it.
+        assert!(at(2.95).is_some());
+        assert_eq!(at(2.7), None);
+    }
+
+    #[test]
+    fn an_end_is_shown_where_the_edge_goes_on_to_it_or_it_is_out_of_view() {
+        let lens = Pinhole::new([200.0; 2], [79.5, 59.5], &[]).unwrap();
+        let camera = Camera::new(160, 120, Model::Pinhole(lens)).unwrap();
+        // Dark below the edge x, which begins at column 40 and goes on to column 100.
+        let level = |u: usize, v: usize| if (40..100).contains(&u) && v > 59 { 60 } else { 180 };
+        let data: Vec<u8> = (0..160 * 120).map(|i| level(i % 160, i / 160)).collect();
+        let image = ImageView::new(&data, 160, 120, 160).unwrap();
+        let bearing = |u: f64, v: f64| camera.unproject(&Vector2::new(u, v)).unwrap();
+        let on = [bearing(95.0, 59.5), bearing(39.5, 100.0), bearing(30.0, 50.0)];
+        let corner = CornerFeature::from_bearings(&bearing(39.5, 59.5), &on).unwrap();
+        let light = LightTable::new(2.2).unwrap();
+        let seen = ObservedCorner {
+            camera: &camera,
+            image: &image,
+            options: &GeneralOptions::default(),
+            light: &light,
+            corner: &corner,
+            camera_from_object: Matrix3::identity(),
+            edges: [Vector3::x(), Vector3::y(), Vector3::z()],
+            vertex_m: corner.vertex() * 2.0,
+        };
+        let detector = SegmentDetector::new(camera.clone(), GeneralOptions::default().segments(None)).unwrap();
+        let mut scratch = GeneralScratch::new(detector.scratch());
+        let mut shows = |column: f64| {
+            let length_m = (column - 39.5) / 200.0 * seen.vertex_m.z;
+            let (bearing, sigma_rad, distance_m) = (Vector3::z(), 1e-3, 2.0);
+            seen.shows(0, &ObservedEnd { bearing, sigma_rad, length_m, distance_m }, &mut scratch)
+        };
+        assert!(shows(99.5) && shows(80.0) && shows(170.0));
+        assert!(!shows(125.0) && !shows(150.0));
     }
 }

@@ -116,16 +116,27 @@ impl CornerPoseEstimator {
         else {
             return [None; 3];
         };
-        let Some(vertex_m) = pose.vertex_m.filter(|_| self.options.angle == IncludedAngle::RIGHT) else {
+        if self.options.angle != IncludedAngle::RIGHT {
             return [None; 3];
-        };
+        }
         let corners = [&estimate.features[0][pair.left], &estimate.features[1][pair.right]];
         let [first, second] = &mut self.scratch;
-        let seen = [
-            self.left.ends(left, corners[0], pose, &RigidMotion::identity(), first),
-            detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
+        let [from_left, right_from_left] = [RigidMotion::identity(), left_from_right.inverse()];
+        let mut ends = [
+            self.left.ends(left, corners[0], pose, &from_left, first),
+            detector.ends(right, corners[1], pose, &right_from_left, second),
         ];
-        edge_ends(seen, left_from_right, &vertex_m, &pose.covariance.fixed_view::<3, 3>(3, 3).into_owned())
+        for axis in 0..3 {
+            let is_shown = match [&ends[0][axis], &ends[1][axis]] {
+                [Some(end), None] => detector.shows_end(right, corners[1], pose, &right_from_left, (axis, end), second),
+                [None, Some(end)] => self.left.shows_end(left, corners[0], pose, &from_left, (axis, end), first),
+                _ => true,
+            };
+            if !is_shown {
+                ends.iter_mut().for_each(|ends| ends[axis] = None);
+            }
+        }
+        edge_ends(ends, left_from_right, pose)
     }
 
     /// The angles between the edges of a corner that both images show.
