@@ -133,7 +133,9 @@ impl CornerPoseEstimator {
                 _ => true,
             };
             if !is_shown {
-                ends.iter_mut().for_each(|ends| ends[axis] = None);
+                for ends in &mut ends {
+                    ends[axis] = None;
+                }
             }
         }
         edge_ends(ends, left_from_right, pose)
