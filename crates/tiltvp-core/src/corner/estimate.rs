@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::feature::CornerFeature;
-use super::general::edge_ends::EdgeEnd;
 
 /// Why there is a pose, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -150,6 +149,17 @@ impl Hypothesis {
     pub fn attitude_covariance(&self) -> Matrix3<f64> {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
+}
+
+/// The far end of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeEnd {
+    /// How far it is from the vertex, metres: along the edge where one camera sees it, else the distance of the two points.
+    pub length_m: f64,
+    /// The standard deviation of that length, metres.
+    pub sigma_m: f64,
+    /// Where it is in the left camera's frame, metres, from its bearings in both images alone; none where one image shows it.
+    pub place_m: Option<Vector3<f64>>,
 }
 
 /// The angle between two edges.

@@ -64,12 +64,11 @@ pub use self::closed_form::standard_model::{CornerCase, StandardType};
 pub use self::coloured::Window;
 pub use self::coloured::segmentation::{ColorOptions, Primary};
 pub use self::detector::{CornerDetector, CornerScratch};
-pub use self::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, EdgeAngle, Hypothesis, PlaceVerdict};
+pub use self::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, EdgeAngle, EdgeEnd, Hypothesis, PlaceVerdict};
 pub use self::estimator_options::{EstimatorOptions, KnownEdge};
 pub use self::feature::{CornerFeature, Edge};
 pub use self::frame::Frame;
 pub use self::fusion::{FusedPose, fuse_rays};
-pub use self::general::edge_ends::EdgeEnd;
 pub use self::options::{
     ColouredOptions, CornerMethod, DetectorOptions, EdgeLineOptions, GeneralOptions, OrientationChoice, PaperOptions,
 };

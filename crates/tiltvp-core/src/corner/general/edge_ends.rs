@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use crate::camera::Camera;
-use crate::corner::estimate::Hypothesis;
+use crate::corner::estimate::{EdgeEnd, Hypothesis};
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
@@ -13,17 +13,6 @@ use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::geometry::{RigidMotion, meeting, tangent_basis};
 use crate::image::{ImageView, LightTable};
 use crate::segments::Segment;
-
-/// The far end of an edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeEnd {
-    /// How far it is from the vertex, metres: along the edge where one camera sees it, else the distance of the two points.
-    pub length_m: f64,
-    /// The standard deviation of that length, metres.
-    pub sigma_m: f64,
-    /// Where it is in the left camera's frame, metres, from its bearings in both images alone; none where one image shows it.
-    pub place_m: Option<Vector3<f64>>,
-}
 
 /// The end of an edge in one image.
 #[derive(Debug, Clone, Copy, PartialEq)]

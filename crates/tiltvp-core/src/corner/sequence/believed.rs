@@ -7,10 +7,10 @@ use super::estimator::CornerPoseEstimator;
 use super::seen_pair::SeenPair;
 use super::track::SAME_PLACE;
 use crate::corner::closed_form::attitude::IncludedAngle;
-use crate::corner::estimate::{BelievedCorner, CornerEstimate, EdgeAngle, Hypothesis};
+use crate::corner::estimate::{BelievedCorner, CornerEstimate, EdgeAngle, EdgeEnd, Hypothesis};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
-use crate::corner::general::edge_ends::{EdgeEnd, edge_ends};
+use crate::corner::general::edge_ends::edge_ends;
 use crate::geometry::RigidMotion;
 
 /// How much worse another match of a corner may fit and still leave it open which one is right: twice the misfit, of noise that has

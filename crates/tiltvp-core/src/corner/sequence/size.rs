@@ -6,10 +6,10 @@ use super::agreement::{SAME_VERTEX_RAD, attitude_near, renamed};
 use super::estimator::CornerPoseEstimator;
 use super::height::SHARE_MAX;
 use crate::corner::closed_form::attitude::IncludedAngle;
-use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
+use crate::corner::estimate::{CornerEstimate, EdgeEnd, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
-use crate::corner::general::edge_ends::{EdgeEnd, along};
+use crate::corner::general::edge_ends::along;
 use crate::corner::sized::{KnownLengths, SeenEnd, SizedPose, Unseen, fit_sized};
 
 /// A corner of the image that may be the box' own, and what is seen of the ends of its edges.
