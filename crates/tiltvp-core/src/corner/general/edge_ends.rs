@@ -76,12 +76,10 @@ impl ObservedCorner<'_> {
 
     /// Whether the image shows an edge up to where another one has its end, as far as that is in view.
     pub(crate) fn shows(&self, axis: usize, end: &ObservedEnd, scratch: &mut GeneralScratch) -> bool {
-        let end = self.vertex_m + self.edges[axis] * end.length_m;
+        let (vertex, end) = (self.corner.vertex(), self.vertex_m + self.edges[axis] * end.length_m);
         let is_in_view = self.camera.project(&end).is_some_and(|pixel| self.camera.contains(&pixel));
-        let (vertex, Some(px_per_rad)) = (self.corner.vertex(), self.camera.px_per_rad(&self.corner.vertex())) else {
-            return true;
-        };
-        let Some(normal) = vertex.cross(&end).try_normalize(1e-6).filter(|_| is_in_view) else { return true };
+        let normal = vertex.cross(&end).try_normalize(1e-6).filter(|_| is_in_view);
+        let (Some(normal), Some(px_per_rad)) = (normal, self.camera.px_per_rad(&vertex)) else { return true };
         let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
         let to_rad = vertex.angle(&end) - clear_rad;
         let last_rad = (to_rad - LAST_PX / px_per_rad).max(clear_rad);
