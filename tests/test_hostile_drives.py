@@ -304,6 +304,19 @@ def test_the_filter_of_the_command_has_the_centre_of_the_whole_log(
         assert float(error @ np.linalg.solve(found["covariance_xy_yaw"], error)) < 16.3
 
 
+def test_rows_that_are_read_one_after_another_show_lines_at_other_times() -> None:
+    """A line is where it is seen up to a tenth of a step earlier or later, and half of them are earlier."""
+    told, rolled = one(UNDISTURBED).bearings, one("rows read in 30 ms").bearings
+    assert np.array_equal(told[:, :2], rolled[:, :2])
+    moved = np.remainder(rolled[:, 2] - told[:, 2] + math.pi, math.tau) - math.pi
+    for track in np.unique(told[:, 1]):
+        own = told[:, 1] == track
+        steps = np.abs(np.diff(np.unwrap(told[own, 2])))
+        assert np.abs(moved[own]).max() <= 0.03 / 0.1 * 150 / 480 * steps.max()
+    assert np.mean(moved != 0.0) > 0.95
+    assert 0.3 < np.mean(moved > 0.0) < 0.7
+
+
 def test_the_table_counts_as_it_says() -> None:
     table = judge_drives(hostile_drives(UNDISTURBED, range(2)))
     summary = summarise_drive_cases(table)

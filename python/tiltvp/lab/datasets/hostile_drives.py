@@ -28,8 +28,13 @@ RHO_M: Final = (0.05, 0.35)
 YAW_SIGMA_RAD: Final = 0.3
 TOO_SHORT: Final = 15
 """Steps of a drive that tells nothing."""
+_STEP_S: Final = 0.1
 LATE_STEPS: Final = 2
 """0.2 s at ten steps a second."""
+_RADIUS_PX: Final = 150.0
+"""At which lines are seen."""
+_ROWS: Final = 480
+"""Of the images."""
 
 
 @dataclass(frozen=True)
@@ -123,12 +128,27 @@ def _slips(log: _Log) -> None:
 
 
 def _off_centre(off_px: float) -> _Case:
-    """Bearings are taken about a centre that is so far off where lines are seen at a radius of 150 pixels."""
+    """Bearings are taken about a centre that is so far off."""
 
     def harm(log: _Log) -> None:
-        way, radii = log.rng.uniform(-math.pi, math.pi), off_px / 150.0
+        way, radii = log.rng.uniform(-math.pi, math.pi), off_px / _RADIUS_PX
         sine, cosine = np.sin(log.bearings[:, 2]), np.cos(log.bearings[:, 2])
         log.bearings[:, 2] = np.arctan2(sine - radii * math.sin(way), cosine - radii * math.cos(way))
+
+    return _Case(harm)
+
+
+def _rolling(readout_s: float) -> _Case:
+    """Rows of an image are read one after another, in so many seconds: a line in one is seen later than in another.
+    Which way rows run is another for each drive."""
+
+    def harm(log: _Log) -> None:
+        down, steps = log.rng.uniform(-math.pi, math.pi), log.bearings[:, :2].astype(int).tolist()
+        seen = dict(zip(map(tuple, steps), log.bearings[:, 2].tolist(), strict=True))
+        for row, (step, landmark) in zip(log.bearings, steps, strict=True):
+            late = readout_s / _STEP_S * _RADIUS_PX / _ROWS * math.sin(row[2] - down)
+            if (other := seen.get((step + (1 if late > 0.0 else -1), landmark))) is not None:
+                row[2] += abs(late) * math.remainder(other - row[2], math.tau)
 
     return _Case(harm)
 
@@ -170,6 +190,7 @@ DRIVE_CASES: Final = {
     "image centre off by 0.5 px": _off_centre(0.5),
     "image centre off by 1 px": _off_centre(1.0),
     "image centre off by 2 px": _off_centre(2.0),
+    "rows read in 30 ms": _rolling(0.03),
     "wheels slip": _Case(_slips),
     "carpet": _Case(_carpet),
     "straight on only": _Case(kinds=("straight",)),
