@@ -317,6 +317,23 @@ def test_rows_that_are_read_one_after_another_show_lines_at_other_times() -> Non
     assert 0.3 < np.mean(moved > 0.0) < 0.7
 
 
+@pytest.mark.parametrize("seed", [460110, 460139])
+def test_rows_that_are_read_one_after_another_are_suspect(seed: int) -> None:
+    """Both logs were answered, by five and six standard deviations beside the truth."""
+    drive = one("rows read in 30 ms", seed)
+    found = tiltvp.calibrate(drive.odometry, drive.bearings, **drive.options)
+    assert not found
+    assert found.mounting.suspect == "rolling_shutter"
+    # 300 of 480 rows lie between both sides, and a step takes 0.1 s.
+    assert found.mounting.suspect_value == pytest.approx(0.03 * 300 / 480 / 0.1, rel=0.4)
+    assert "rolling shutter" in found.reason
+    error = np.array([found.mounting.x_m, found.mounting.y_m, found.mounting.yaw_rad]) - drive.truth
+    assert error @ np.linalg.solve(found.mounting.covariance_xy_yaw, error) < 16.3
+    calibrator = tiltvp.SelfCalibrator(**drive.options)
+    calibrator.follow(drive.odometry, drive.bearings)
+    assert calibrator.estimate.suspect == "rolling_shutter"
+
+
 def test_the_table_counts_as_it_says() -> None:
     table = judge_drives(hostile_drives(UNDISTURBED, range(2)))
     summary = summarise_drive_cases(table)

@@ -149,7 +149,11 @@ impl SelfCalibrator {
                     filter.monitor().alarmed(),
                 )
                 .judged(examination.contradictions, examination.suspect)
-                .doubting(examination.doubted_centre.as_ref(), || filter.covariance_by_centre(), start)
+                .doubting(
+                    examination.doubted_once_round.as_ref(),
+                    || filter.covariance_as_told(),
+                    start,
+                )
             }
             Filter::Paper(filter, monitor) => {
                 let nis = monitor.mean_nis();

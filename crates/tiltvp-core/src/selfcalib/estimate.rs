@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::Matrix3;
 
-use super::diagnosis::{Cause, Contradictions, Deviation, Suspect};
+use super::diagnosis::{Contradictions, Deviation, Suspect};
 use super::model::Mounting;
 use super::observability::Observability;
 
@@ -59,18 +59,18 @@ impl MountingEstimate {
         Self { contradictions, suspect, ..self }
     }
 
-    /// This estimate with the image centre suspect, where its doubt alone is why not everything is determined: with the covariance
-    /// `known` of a centre as told, and that at the start, everything is.
+    /// This estimate with the image centre or the shutter suspect, where its doubt alone is why not everything is determined: with the
+    /// covariance `known` of one as told, and that at the start, everything is.
     pub(crate) fn doubting(
         self,
-        centre: Option<&Deviation>,
+        doubted: Option<&Deviation>,
         known: impl FnOnce() -> Matrix3<f64>,
         start: &Matrix3<f64>,
     ) -> Self {
         let determined = || Observability::new(&self.mounting, &known(), start).complete();
-        match centre {
-            Some(centre) if self.suspect.is_none() && !self.observability.complete() && determined() => {
-                Self { suspect: Some(Suspect { cause: Cause::Centre, value: centre.value }), ..self }
+        match doubted {
+            Some(doubted) if self.suspect.is_none() && !self.observability.complete() && determined() => {
+                Self { suspect: doubted.once_round(), ..self }
             }
             _ => self,
         }

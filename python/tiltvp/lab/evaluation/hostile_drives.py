@@ -39,6 +39,7 @@ CAUSES: Final = {
     "images mirrored": "wheels swapped",
     "camera bumped": "bump",
     "two landmarks merged": "under one name",
+    "rows read": "rolling shutter",
     "image centre": "image centre",
     "straight": "rotate in place",
     "rotation": "drive straight",

@@ -35,7 +35,7 @@ pub(crate) struct BearingRow {
     pub(crate) by_pose: Vector3<f64>,
     /// By the pose of the keyframe's [neighbour](BundleProblem::neighbour).
     pub(crate) by_neighbour: Vector3<f64>,
-    pub(crate) by_calibration: [f64; 8],
+    pub(crate) by_calibration: [f64; 10],
     /// The place of its landmark among the shared parameters.
     pub(crate) at: usize,
     pub(crate) by_landmark: [f64; 2],
@@ -130,12 +130,17 @@ impl BundleProblem {
             let p = view.jacobians(point);
             let s = 1.0 / (self.bearing_sigma * self.scatters[observation.landmark]);
             let residual = view.residual(point, &observation.about(&self.centre).along) * s;
-            let mut by_calibration = [0.0; 8];
+            let mut by_calibration = [0.0; 10];
             by_calibration[..3].copy_from_slice((p.by_mounting * s).as_slice());
             let (mut by_pose, mut by_neighbour) = (p.by_pose * s, Vector3::zeros());
             if let Some(by) = &by {
+                let by_time = by_pose.dot(&by.offset);
                 if self.free.offset {
-                    by_calibration[self.free.offset_at()] = by_pose.dot(&by.offset);
+                    by_calibration[self.free.offset_at()] = by_time;
+                }
+                if self.free.shutter {
+                    let at = self.free.shutter_at();
+                    by_calibration[at..at + 2].copy_from_slice((observation.along * by_time).as_slice());
                 }
                 by_neighbour = by.neighbour.transpose() * by_pose;
                 by_pose = by.pose.transpose() * by_pose;

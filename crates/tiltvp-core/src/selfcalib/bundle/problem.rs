@@ -50,8 +50,9 @@ pub(crate) struct BundleProblem {
     pub(crate) slip: MotionLoss,
 }
 
-/// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base), on the time offset, seconds, and on the image
-/// centre. Wheels are known to 20 %, clocks to a second and centres to a tenth of the radius at worst. A drive determines them a
+/// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base), on the time offset, and that of a rolling shutter from
+/// the middle to the lines, seconds, and on the image centre. Wheels are known to 20 %, clocks to a second and centres to a tenth of the radius
+/// at worst. A drive determines them a
 /// hundred times better, so that the priors only keep the equations regular.
 const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
 const OFFSET_SIGMA_S: f64 = 1.0;
@@ -172,6 +173,10 @@ impl BundleProblem {
             let [x, y] = problem.centre.into();
             insert(problem.free.centre_at(), &[(x, CENTRE_SIGMA), (y, CENTRE_SIGMA)]);
             problem.free.centre = true;
+        }
+        if free.shutter && !problem.free.shutter {
+            insert(problem.free.shutter_at(), &[(0.0, OFFSET_SIGMA_S); 2]);
+            problem.free.shutter = true;
         }
         problem
     }

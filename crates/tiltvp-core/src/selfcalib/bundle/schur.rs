@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn rows_are_differences_by_pose_neighbour_time_and_centre() {
-        let mut problem = drive(FreeParameters::ALL);
+        let mut problem = drive(FreeParameters { shutter: true, ..FreeParameters::ALL });
         let uneven = Vector3::new(0.01, 0.0, -0.02);
         problem.keyframes[3].unevenness = [uneven, -uneven];
         let h = 1e-6;
@@ -354,8 +354,13 @@ mod tests {
                     })
                 });
                 let mut row = 0;
+                let seen = &problem.keyframes[at].observations;
                 problem.for_each_bearing_row(at, &problem.homogeneous_landmarks(), |given| {
                     assert!((given.by_calibration[5] - by_time[row]).abs() < 1e-5);
+                    // A shutter that takes so long to the lines makes each late by its own share.
+                    for (axis, share) in seen[row].along.iter().enumerate() {
+                        assert!((given.by_calibration[8 + axis] - by_time[row] * share).abs() < 1e-5);
+                    }
                     for (axis, by_axis) in by_centre.iter().enumerate() {
                         assert!((given.by_calibration[6 + axis] - by_axis[row]).abs() < 1e-5);
                     }

@@ -1,4 +1,4 @@
-//! How far the wheels, the clock and the image centre are from what is assumed, by the score of the solution with each of them free.
+//! How far the wheels, the clock, the image centre and the shutter are from what is assumed, by the score of the solution with each of them free.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -13,6 +13,7 @@ pub(crate) enum Assumed {
     WheelBase,
     TimeOffset,
     Centre,
+    Shutter,
 }
 
 /// What one of them would be if it were free.
@@ -20,7 +21,7 @@ pub(crate) enum Assumed {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Deviation {
     pub(crate) of: Assumed,
-    /// How far it is off: of the wheel base in units of that, of the centre the distance.
+    /// How far it is off: of the wheel base in units of that, of the centre the distance, of the shutter seconds from the middle to the lines.
     pub(crate) value: f64,
     /// The same in standard deviations.
     pub(crate) sigmas: f64,
@@ -30,26 +31,36 @@ pub(crate) struct Deviation {
     pub(crate) scatter: Matrix3<f64>,
 }
 
-/// Standard deviations of the image centre from which on the mounting is stated no more surely than with the centre free. The mounting
-/// follows it by two of its own for each: of 40 drives with a centre off by half a pixel in 150, and not named, 13 errors were beyond
-/// what 99.9 % are within, with this 5.
-const DOUBTED_CENTRE_SIGMAS: f64 = 2.0;
+/// Standard deviations of the image centre, or of a rolling shutter, from which on the mounting is stated no more surely than with it free.
+/// The mounting follows either by two of its own for each: of 40 drives with a centre off by half a pixel in 150, and not named, 13 errors were
+/// beyond what 99.9 % are within, with this 5.
+const DOUBTED_SIGMAS: f64 = 2.0;
 
-/// That of the image centre, where it is doubted. Noise has so many times the variance that is told.
-pub(crate) fn doubted_centre(deviations: &[Deviation], excess: f64) -> Option<&Deviation> {
-    let mut of_centre = deviations.iter().filter(|deviation| deviation.of == Assumed::Centre);
-    of_centre.find(|deviation| deviation.sigmas > DOUBTED_CENTRE_SIGMAS * excess.sqrt())
+/// What errs once round the camera, the image centre or the shutter, where one is doubted: the more significant one. Noise has so many times
+/// the variance that is told.
+pub(crate) fn doubted_once_round(deviations: &[Deviation], excess: f64) -> Option<&Deviation> {
+    let once_round = deviations.iter().filter(|deviation| deviation.of.errs_once_round());
+    once_round
+        .filter(|deviation| deviation.sigmas > DOUBTED_SIGMAS * excess.sqrt())
+        .max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
+}
+
+impl Assumed {
+    /// Whether bearings err once round the camera where it is another one, which the mounting follows more than anything else.
+    pub(super) fn errs_once_round(self) -> bool {
+        matches!(self, Self::Centre | Self::Shutter)
+    }
 }
 
 impl BundleProblem {
-    /// The deviations of the imbalance, of the wheel base, of the time offset and of the image centre from what is
+    /// The deviations of the imbalance, of the wheel base, of the time offset, of the image centre and of the shutter from what is
     /// assumed, each as if it alone were free too; none of what is free anyway. `covariance` is that of the mounting, and noise has
     /// `excess` times the variance that is told.
     ///
     /// Of the time offset it is the more significant one of early and of late bearings.
     pub(crate) fn deviations(&self, covariance: &Matrix3<f64>, excess: f64) -> Vec<Deviation> {
         let covariance = &(covariance * excess);
-        let mut problem = self.with_free(FreeParameters::ALL);
+        let mut problem = self.with_free(FreeParameters { shutter: true, ..FreeParameters::ALL });
         problem.as_wheels_read = !self.free.offset;
         problem.turns_as_read = true;
         // What outliers pull is no deviation.
@@ -67,12 +78,14 @@ impl BundleProblem {
     fn deviations_of(&self, problem: &Self, covariance: &Matrix3<f64>, excess: f64) -> Vec<Deviation> {
         let Some(system) = problem.eliminate_poses(self.keyframes.len() - 1, false, 0.0) else { return Vec::new() };
         let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
-        let (offset, centre) = (problem.free.offset_at(), problem.free.centre_at());
+        let free = problem.free;
+        let (offset, centre, shutter) = (free.offset_at(), free.centre_at(), free.shutter_at());
         let all = [
             (Assumed::Imbalance, 3..4, self.free.wheels),
             (Assumed::WheelBase, 4..5, self.free.wheels),
             (Assumed::TimeOffset, offset..offset + 1, self.free.offset),
             (Assumed::Centre, centre..centre + 2, self.free.centre),
+            (Assumed::Shutter, shutter..shutter + 2, self.free.shutter),
         ];
         let one = |k: usize| {
             let (of, own, is_free) = &all[k];

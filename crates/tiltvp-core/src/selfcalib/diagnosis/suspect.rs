@@ -23,9 +23,9 @@ const MOST_CONTRADICTED: f64 = 0.1;
 pub(crate) const DEVIATION_SIGMAS: f64 = 5.0;
 const DEVIATION_SHIFT: f64 = 1.0;
 
-/// The same of the image centre: 99 % of two normal numbers are within. The mounting follows it more than anything else, by two standard
-/// deviations for each of its own.
-const CENTRE_SIGMAS: f64 = 3.035;
+/// The same of the image centre and of a rolling shutter: 99 % of two normal numbers are within. The mounting follows them more than anything
+/// else, by two standard deviations for each of their own.
+const ONCE_ROUND_SIGMAS: f64 = 3.035;
 
 /// Ratio of a standard deviation as motions of parts of the drive scatter to what their noise makes, beyond which the drive is not the
 /// same throughout. Of 300 simulated drives whose motions err alone none is above 3.8.
@@ -55,8 +55,17 @@ words! {
         TimeOffset = "time_offset_s",
         /// The bearings err once round the camera: another image centre, or a camera that leans.
         Centre = "centre",
+        /// Lines are seen later on one side of the camera than on the other: rows that are read one after another.
+        Shutter = "rolling_shutter",
         /// The motions of a part of the drive err together: a carpet, a tyre that loses air.
         Drift = "drift",
+    }
+}
+
+impl Cause {
+    /// Whether it makes bearings err once round the camera, all along the drive.
+    pub(crate) fn errs_once_round(self) -> bool {
+        matches!(self, Self::Centre | Self::Shutter)
     }
 }
 
@@ -67,7 +76,8 @@ pub struct Suspect {
     /// What is most likely wrong.
     pub cause: Cause,
     /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the
-    /// angle in radians, of `centre` the largest error of a bearing in radians, of `drift` the factor of a standard deviation.
+    /// angle in radians, of `centre` the largest error of a bearing in radians, of `rolling_shutter` by how many steps lines are later on
+    /// one side, or seconds in a log with times, of `drift` the factor of a standard deviation.
     pub value: f64,
 }
 
@@ -104,6 +114,10 @@ impl fmt::Display for Suspect {
                 "bearings err by {:.2} degrees once round the camera, as about another image centre or from a camera that leans: try estimate_centre",
                 value.to_degrees()
             ),
+            Cause::Shutter => write!(
+                f,
+                "lines seem to be seen {value:.3} steps later on one side of the camera than on the other (seconds, with times), as through a rolling shutter: drive more slowly"
+            ),
             Cause::Drift => write!(
                 f,
                 "motions of a part of the drive err together, as on a carpet: deviations are {value:.1} times those of motions that err alone"
@@ -112,6 +126,18 @@ impl fmt::Display for Suspect {
                 f,
                 "bearings seem to be {value:.2} steps later than the odometry (earlier if negative): try estimate_time_offset, with times"
             ),
+        }
+    }
+}
+
+impl Deviation {
+    /// The suspect of what errs once round the camera, none of others.
+    pub(crate) fn once_round(&self) -> Option<Suspect> {
+        match self.of {
+            Assumed::Centre => Some(Suspect { cause: Cause::Centre, value: self.value }),
+            // From side to side it is twice that from the middle.
+            Assumed::Shutter => Some(Suspect { cause: Cause::Shutter, value: 2.0 * self.value }),
+            _ => None,
         }
     }
 }
@@ -134,7 +160,7 @@ impl BundleProblem {
             return found(Cause::Turns, share(counts.contradicted_turns, counts.turns));
         }
         let excess = factors.excess();
-        let most = |d: &Deviation| if d.of == Assumed::Centre { CENTRE_SIGMAS } else { DEVIATION_SIGMAS };
+        let most = |d: &Deviation| if d.of.errs_once_round() { ONCE_ROUND_SIGMAS } else { DEVIATION_SIGMAS };
         let worst = deviations
             .iter()
             .filter(|d| d.sigmas > most(d) * excess.sqrt() && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
@@ -146,7 +172,7 @@ impl BundleProblem {
                 Assumed::WheelBase => found(Cause::WheelBase, self.wheels.base_m * (1.0 + d.value).abs()),
                 Assumed::TimeOffset => found(Cause::TimeOffset, d.value),
                 // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre.
-                Assumed::Centre => bump().or_else(|| found(Cause::Centre, d.value)),
+                Assumed::Centre | Assumed::Shutter => bump().or_else(|| d.once_round()),
             };
         }
         if factors.bearings > 1.0 {

@@ -65,6 +65,7 @@ pub(super) fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProb
         wheels: options.estimate_odometry,
         offset: options.estimate_time_offset,
         centre: options.estimate_centre,
+        shutter: false,
     };
     let with_wheels = FreeParameters { wheels: true, ..asked };
     let start = options.filter.start.vector();
