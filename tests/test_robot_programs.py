@@ -152,7 +152,8 @@ def test_columns_are_taken_as_a_program_collects_them() -> None:
 
 
 def test_samples_are_taken_as_a_program_collects_them() -> None:
-    times, rates, forces = [0.0, 0.05, 0.1], [(0, 0, 1)] * 3, [[0.0, 9.81, 0.0]] * 3
+    times, rates = [0.0, 0.05, 0.1], [(0, 0, 1)] * 3
+    forces = [[9.81 * math.sin(time), 9.81 * math.cos(time), 0.0] for time in times]
     told = InertialSamples(times, rates, forces).known(0.0, 0.1)  # type: ignore[arg-type]
     assert told["gyro"][0][1, 0] == pytest.approx(np.sin(0.1))
     assert told["gravity"] is not None

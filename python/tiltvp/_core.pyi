@@ -2195,10 +2195,10 @@ class MountingEstimate:
 
     @property
     def suspect_value(self) -> float | None:
-        """The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns",
-        "outliers" and "slips" their share, of "bump" its angle and of "centre" the largest error of a bearing in
-        radians, of "rolling_shutter" how many steps later lines are seen on one side (seconds in a log with times), of
-        "drift" the factor of a standard deviation.
+        """The value that would suit the log better, of what `suspect` names (times in steps, or in seconds in a log
+        with times); of "turns", "outliers" and "slips" their share, of "bump" its angle and of "centre" the largest
+        error of a bearing in radians, of "rolling_shutter" how much later lines are seen on one side, of "drift" the
+        factor of a standard deviation.
         """
 
     def to_dict(self) -> dict[str, Any]:

@@ -58,10 +58,9 @@ value! {
         /// centre, or a camera that leans), "rolling_shutter" (lines are seen later on one side than on the other) or "drift" (motions
         /// of a part of the drive that err together). None if nothing is.
         suspect: Option<String> = own.suspect.map(|suspect| suspect.cause.name().to_owned()),
-        /// The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns", "outliers" and
-        /// "slips" their share, of "bump" its angle and of "centre" the
-        /// largest error of a bearing in radians, of "rolling_shutter" how many steps later lines are seen on one side (seconds in a
-        /// log with times), of "drift" the factor of a standard deviation.
+        /// The value that would suit the log better, of what `suspect` names (times in steps, or in seconds in a log with times); of
+        /// "turns", "outliers" and "slips" their share, of "bump" its angle and of "centre" the largest error of a bearing in radians, of
+        /// "rolling_shutter" how much later lines are seen on one side, of "drift" the factor of a standard deviation.
         suspect_value: Option<f64> = own.suspect.map(|suspect| suspect.value),
         /// What is determined, what motion would help, whether there was an alarm and what is suspected, in a sentence.
         reason: String = own.to_string(),

@@ -15,6 +15,7 @@ pub(crate) struct FreeParameters {
 }
 
 impl FreeParameters {
+    /// All that is estimated.
     pub(crate) const ALL: Self = Self { wheels: true, offset: true, centre: true, shutter: false };
 
     /// The number of calibration parameters; those of the landmarks follow.

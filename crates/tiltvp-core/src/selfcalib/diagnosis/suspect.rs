@@ -75,9 +75,9 @@ impl Cause {
 pub struct Suspect {
     /// What is most likely wrong.
     pub cause: Cause,
-    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the
-    /// angle in radians, of `centre` the largest error of a bearing in radians, of `rolling_shutter` by how many steps lines are later on
-    /// one side, or seconds in a log with times, of `drift` the factor of a standard deviation.
+    /// The number that would suit, times in steps, or in seconds in a log with times; of `turns`, `outliers` and `slips` the share that is
+    /// contradicted, of `bump` the angle in radians, of `centre` the largest error of a bearing in radians, of `rolling_shutter` by how much
+    /// later lines are seen on one side, of `drift` the factor of a standard deviation.
     pub value: f64,
 }
 
@@ -116,7 +116,7 @@ impl fmt::Display for Suspect {
             ),
             Cause::Shutter => write!(
                 f,
-                "lines seem to be seen {value:.3} steps later on one side of the camera than on the other (seconds, with times), as through a rolling shutter: drive more slowly"
+                "lines seem to be seen {value:.3} steps (seconds, with times) later on one side of the camera than on the other, as through a rolling shutter: drive more slowly"
             ),
             Cause::Drift => write!(
                 f,
@@ -124,7 +124,7 @@ impl fmt::Display for Suspect {
             ),
             Cause::TimeOffset => write!(
                 f,
-                "bearings seem to be {value:.2} steps later than the odometry (earlier if negative): try estimate_time_offset, with times"
+                "bearings seem to be {value:.2} steps (seconds, with times) later than the odometry (earlier if negative): try estimate_time_offset, with times"
             ),
         }
     }
