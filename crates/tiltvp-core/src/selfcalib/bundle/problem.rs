@@ -52,8 +52,7 @@ pub(crate) struct BundleProblem {
 
 /// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base), on the time offset, and that of a rolling shutter from
 /// the middle to the lines, seconds, and on the image centre. Wheels are known to 20 %, clocks to a second and centres to a tenth of the radius
-/// at worst. A drive determines them a
-/// hundred times better, so that the priors only keep the equations regular.
+/// at worst. A drive determines them a hundred times better, so that the priors only keep the equations regular.
 const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
 const OFFSET_SIGMA_S: f64 = 1.0;
 const CENTRE_SIGMA: f64 = 0.1;
