@@ -27,13 +27,36 @@ pub(crate) fn table_in_blocks<T: Clone + Default + Send>(
     block: usize,
     entry: impl Fn(usize) -> T + Sync,
 ) -> Vec<T> {
+    filled_in_blocks(len, block, |first, out| out.iter_mut().enumerate().for_each(|(i, out)| *out = entry(first + i)))
+}
+
+/// The entries `0..len`, written by blocks of them: `fill` is told the number of a block's first.
+pub(crate) fn filled<T: Clone + Default + Send>(len: usize, fill: impl Fn(usize, &mut [T]) + Sync) -> Vec<T> {
+    filled_in_blocks(len, BLOCK, fill)
+}
+
+/// The entries of an image in row order, written by rows: `fill` is told the number of each.
+pub(crate) fn rows<T: Clone + Default + Send>(
+    [width, height]: [usize; 2],
+    fill: impl Fn(usize, &mut [T]) + Sync,
+) -> Vec<T> {
+    let width = width.max(1);
+    filled_in_blocks(width * height, width * BLOCK.div_ceil(width), |first, out| {
+        out.chunks_mut(width).enumerate().for_each(|(k, row)| fill(first / width + k, row));
+    })
+}
+
+fn filled_in_blocks<T: Clone + Default + Send>(
+    len: usize,
+    block: usize,
+    fill: impl Fn(usize, &mut [T]) + Sync,
+) -> Vec<T> {
     let mut out = vec![T::default(); len];
     let part = part_of(len, block);
     on_threads(out.chunks_mut(part).enumerate(), |(number, out)| {
         for (place, out) in out.chunks_mut(block).enumerate() {
             check();
-            let first = number * part + place * block;
-            out.iter_mut().enumerate().for_each(|(i, out)| *out = entry(first + i));
+            fill(number * part + place * block, out);
         }
     });
     out

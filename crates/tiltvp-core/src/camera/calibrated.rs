@@ -157,6 +157,11 @@ impl Camera {
         with_model!(&self.model, model => model.unproject(pixel)).map(|bearing| self.reflect(&bearing))
     }
 
+    /// As [`unproject_jacobian`](Self::unproject_jacobian), without that limit.
+    pub(crate) fn unproject_jacobian_unlimited(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        with_model!(&self.model, model => self.unlimited_jacobian_by(model, pixel))
+    }
+
     /// That limit, if there is one: bearings are seen whose component along an axis is at least so much.
     pub(crate) fn limit(&self) -> Option<(Vector3<f64>, f64)> {
         let axis = self.reflect(&Vector3::new(0.0, 0.0, self.axis_z.signum()));
@@ -196,11 +201,20 @@ impl Camera {
         model: &impl CameraModel,
         pixel: &Vector2<f64>,
     ) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        self.unlimited_jacobian_by(model, pixel).filter(|(bearing, _)| self.within(&self.reflect(bearing)))
+    }
+
+    #[inline]
+    fn unlimited_jacobian_by(
+        &self,
+        model: &impl CameraModel,
+        pixel: &Vector2<f64>,
+    ) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
         let (bearing, mut jacobian) = model.unproject_jacobian(pixel)?;
         if self.mirror {
             jacobian.row_mut(2).neg_mut();
         }
-        self.within(&bearing).then(|| (self.reflect(&bearing), jacobian))
+        Some((self.reflect(&bearing), jacobian))
     }
 
     #[inline]

@@ -20,6 +20,7 @@ mod batch;
 mod brown;
 mod calibrated;
 mod conformance;
+mod dense;
 mod difference;
 mod double_sphere;
 mod equidistant;
@@ -48,6 +49,7 @@ mod values;
 
 pub use calibrated::{Camera, LARGEST_SIDE_PX, MOST_PIXELS};
 pub use conformance::{Conformance, conformance};
+pub(crate) use dense::{Interpolated, STEP, bearing_table, bearings, cubic};
 pub use difference::{Derivative, derivative};
 pub use double_sphere::DoubleSphere;
 pub use equidistant::Equidistant;

@@ -1,6 +1,8 @@
 //! From an edge pixel's gradient to the great circle that the edge lies on.
 
-use nalgebra::{Matrix3, Matrix3x2, Vector2};
+use std::array;
+
+use nalgebra::{Matrix3, SVector, Vector2};
 use tiltvp_kernels::compaction::{KeptRows, ROOM, RowBlock, compact_rows};
 use tiltvp_kernels::normals::{self, BLOCK, Normals};
 use tiltvp_kernels::prefetch::prefetch;
@@ -8,9 +10,13 @@ use tiltvp_kernels::prefetch::prefetch;
 use super::detect::EdgePixels;
 use super::prefilter::Prefilter;
 use super::region::Region;
-use crate::camera::Camera;
+use super::whole::whole;
+use crate::camera::{Camera, Interpolated};
 use crate::parallel;
 use crate::robust::Rows;
+
+/// By how much entries may be off, as a share of the largest of a map: a third of the last bit that is kept.
+const SHARE: f64 = 1e-5;
 
 /// How the normal of an edge's great circle is made from the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,33 +41,36 @@ impl LiftTable {
     /// One matrix for each pixel of the region, all divided by their root mean square, so that a gradient of one grey level
     /// per pixel gives a normal of a length about one: longer where the lens shows the edge's direction better.
     pub fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, region: &Region, kind: NormalKind) -> Self {
-        let map = |slot: usize| -> Matrix3x2<f64> {
-            let (u, v) = region.place(slot);
-            let pixel = Vector2::new(f64::from(u), f64::from(v));
-            let back = camera.unproject_jacobian(&pixel).map(|(_, back)| back);
+        let map = |pixel: Vector2<f64>| -> Option<SVector<f64, 6>> {
+            let (_, back) = camera.unproject_jacobian_unlimited(&pixel)?;
             let matrix = match kind {
                 // d pixel / d bearing is the pseudoinverse of d bearing / d pixel: neither has a part along the bearing.
-                NormalKind::Tangent => {
-                    back.and_then(|back| (back.transpose() * back).try_inverse().map(|inverse| back * inverse))
-                }
+                NormalKind::Tangent => back * (back.transpose() * back).try_inverse()?,
                 NormalKind::Gradient => back,
             };
-            matrix.map_or(Matrix3x2::zeros(), |matrix| robot_from_camera * matrix)
+            Some(SVector::from_column_slice((robot_from_camera * matrix).as_slice()))
         };
+        let lens = Interpolated::new([camera.width() as usize, camera.height() as usize], SHARE, map);
         // Twice, as the matrices would take four times the memory of the table.
         let measured = parallel::blocks(region.len(), |slots| {
-            slots.map(map).fold((0.0, 0.0f64), |(squares, largest), matrix| {
-                (squares + matrix.norm_squared(), largest.max(matrix.amax()))
-            })
+            let (mut squares, mut largest) = (0.0, 0.0f64);
+            region.along(&lens, slots, |_, map| {
+                squares += map.norm_squared();
+                largest = largest.max(map.amax());
+            });
+            (squares, largest)
         });
         let (squares, largest) =
             measured.iter().fold((0.0, 0.0f64), |(squares, largest), own| (squares + own.0, largest.max(own.1)));
         let mean_square = squares / (2 * region.len().max(1)) as f64;
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
         let unit = largest.max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
-        let entry = |m: &Matrix3x2<f64>, i: usize, j: usize| u32::from((m[(i, j)] / unit).round() as i16 as u16);
-        let words = |m: Matrix3x2<f64>| std::array::from_fn(|i| entry(&m, i, 0) | (entry(&m, i, 1) << 16));
-        let maps = parallel::table(region.len(), |slot| words(map(slot)));
+        let entry = |value: f64| u32::from(whole(value / unit) as u16);
+        let maps = parallel::filled(region.len(), |first, out: &mut [[u32; 3]]| {
+            region.along(&lens, first..first + out.len(), |k, map| {
+                out[k] = array::from_fn(|i| entry(map[i]) | (entry(map[i + 3]) << 16));
+            });
+        });
         Self { maps, unit: (unit * scale) as f32 }
     }
 
@@ -74,7 +83,7 @@ impl LiftTable {
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
         };
-        Prefilter::new(self.maps.len(), |slot| vector(&self.maps[slot]), sin_max)
+        Prefilter::new(self.maps.len(), |slot| vector(&self.maps[slot]), 1.0, sin_max)
     }
 
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tiltvp_kernels::gradient::Directions;
 
 use super::region::{Region, Span};
+use super::whole::whole;
 use crate::parallel;
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
@@ -42,15 +43,11 @@ const HAIR: f64 = 1.0 + 5e-5;
 const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
 
 impl Prefilter {
-    /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`. The vectors are asked for twice, as
-    /// they would take twice the memory of what is kept of them.
-    pub(super) fn new(len: usize, vector: impl Fn(usize) -> [f32; 2] + Sync, limit: f64) -> Self {
-        let largest =
-            parallel::blocks(len, |slots| slots.flat_map(&vector).fold(0.0, |most: f32, x| most.max(x.abs())));
-        let largest = largest.into_iter().fold(0.0, f32::max);
-        let unit = f64::from(largest.max(f32::MIN_POSITIVE)) / f64::from(i16::MAX);
-        let whole = |vector: [f32; 2]| vector.map(|x| (f64::from(x) / unit).round() as i16);
-        let shape = Shape::Each(parallel::table(len, |slot| whole(vector(slot))));
+    /// One vector for each pixel of the region, in slot order, none of whose components is above `largest`, and the limit of
+    /// `|q . g| / |g|`.
+    pub(super) fn new(len: usize, vector: impl Fn(usize) -> [f32; 2] + Sync, largest: f64, limit: f64) -> Self {
+        let unit = largest / f64::from(i16::MAX);
+        let shape = Shape::Each(parallel::table(len, |slot| vector(slot).map(|x| whole(f64::from(x) / unit))));
         Self { vectors: Arc::new(Source { shape, unit }), limit: 0.0 }.with_limit(limit)
     }
 
@@ -72,7 +69,7 @@ impl Prefilter {
                 let (u, v) = region.place(slot);
                 away((u.into(), v.into())).map(|x| x as f32)
             };
-            return Self::new(region.len(), vector, offset_max_px);
+            return Self::new(region.len(), vector, largest, offset_max_px);
         }
         let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i32);
         let shape = Shape::From { centre, parts: parts as i16 };

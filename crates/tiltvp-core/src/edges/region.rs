@@ -1,9 +1,11 @@
 //! The pixels of the elevation band, as spans of rows, computed once per camera.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use std::ops::Range;
+
+use nalgebra::{Matrix3, SVector, Vector2, Vector3};
 
 use super::options::{EdgeOptions, Mask};
-use crate::camera::Camera;
+use crate::camera::{Camera, Interpolated, bearing_table, bearings};
 use crate::error::{Error, Result};
 use crate::interrupt::check;
 use crate::parallel;
@@ -62,7 +64,7 @@ impl Region {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub(crate) fn with_notes<T: Copy + Default + Send>(
+    pub(crate) fn with_notes<T: Copy + Default + Send + Sync>(
         camera: &Camera,
         robot_from_camera: &Matrix3<f64>,
         options: &EdgeOptions,
@@ -89,24 +91,20 @@ impl Region {
         }
         camera.check_memory(TABLE_BYTES + SCRATCH_BYTES)?;
         let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
-        let seen = parallel::table(width * height, |i| {
-            let (u, v) = (i % width, i / width);
-            if mask.is_some_and(|mask| !mask.usable(u, v)) {
+        let seen = bearing_table(camera, robot_from_camera, |i, bearing| {
+            if mask.is_some_and(|mask| !mask.usable(i % width, i / width)) {
                 return (Sight::None, T::default());
             }
-            let bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
             match bearing {
                 Some(b) if (lowest..=highest).contains(&b.z) => (Sight::Band, note(&b)),
                 Some(_) => (Sight::World, T::default()),
                 None => (Sight::None, T::default()),
             }
         });
-        let mut inside = erode(&seen, width, options.reach_px());
+        let mut inside = surrounded(|i| seen[i].0 != Sight::None, [width, height], options.reach_px());
         inside.iter_mut().zip(&seen).for_each(|(inside, (sight, _))| *inside &= *sight == Sight::Band);
         let count = inside.iter().filter(|inside| **inside).count();
         let mut notes = Vec::with_capacity(count);
-        notes.extend(inside.iter().zip(&seen).filter(|(inside, _)| **inside).map(|(_, (_, note))| *note));
-        drop(seen);
         let mut region = Self {
             camera: camera.clone(),
             robot_from_camera: *robot_from_camera,
@@ -117,21 +115,16 @@ impl Region {
             pixels_per_rad: 0.0,
         };
         for (v, row) in inside.chunks_exact(width).enumerate() {
-            let mut open: Option<Span> = None;
-            for u in 0..=width {
-                match (row.get(u).is_some_and(|inside| *inside), &mut open) {
-                    (true, _) => {
-                        open.get_or_insert(Span { v, first: u, end: u, slot: region.places.len() }).end = u + 1;
-                        region.places.push((u as u16, v as u16));
-                    }
-                    (false, Some(span)) => {
-                        region.first_column = region.first_column.min(span.first);
-                        region.end_column = region.end_column.max(span.end);
-                        region.spans.push(*span);
-                        open = None;
-                    }
-                    (false, None) => {}
-                }
+            check();
+            let mut end = 0;
+            while let Some(away) = row[end..].iter().position(|inside| *inside) {
+                let first = end + away;
+                end = row[first..].iter().position(|inside| !inside).map_or(width, |length| first + length);
+                region.spans.push(Span { v, first, end, slot: region.places.len() });
+                region.places.extend((first..end).map(|u| (u as u16, v as u16)));
+                notes.extend(seen[v * width..][first..end].iter().map(|(_, note)| *note));
+                region.first_column = region.first_column.min(first);
+                region.end_column = region.end_column.max(end);
             }
         }
         let shows_nothing = |mask: &Mask| (0..height).all(|v| (0..width).all(|u| !mask.usable(u, v)));
@@ -177,6 +170,31 @@ impl Region {
             return Err(Error::option("row_stride", stride, "a number of rows from 1 on that leaves some of the band"));
         }
         Ok(thinned)
+    }
+
+    /// An entry for each slot, of its bearing in the robot frame but for a millionth.
+    pub(crate) fn bearing_table<T: Clone + Default + Send>(&self, of: impl Fn(Vector3<f64>) -> T + Sync) -> Vec<T> {
+        let lens = bearings(&self.camera, &self.robot_from_camera);
+        parallel::filled(self.len(), |first, out: &mut [T]| {
+            self.along(&lens, first..first + out.len(), |k, bearing| out[k] = of(bearing));
+        })
+    }
+
+    /// Tells of some slots what the lens has there, each by its number among them; zeros where it has nothing.
+    pub(crate) fn along<const N: usize, F: Fn(Vector2<f64>) -> Option<SVector<f64, N>> + Sync>(
+        &self,
+        lens: &Interpolated<N, F>,
+        slots: Range<usize>,
+        mut tell: impl FnMut(usize, SVector<f64, N>),
+    ) {
+        let first = self.spans.partition_point(|span| span.slot + span.end - span.first <= slots.start);
+        for span in self.spans[first..].iter().take_while(|span| span.slot < slots.end) {
+            let own = span.slot.max(slots.start)..(span.slot + span.end - span.first).min(slots.end);
+            let column = |slot: usize| span.first + slot - span.slot;
+            lens.along(span.v, column(own.start)..column(own.end), |k, value| {
+                tell(own.start - slots.start + k, value.unwrap_or_else(SVector::zeros));
+            });
+        }
     }
 
     /// Mean solid angle of a pixel in steradians, over a sample of the pixels.
@@ -261,30 +279,27 @@ enum Sight {
     Band,
 }
 
-/// `true` where the whole square of `reach` pixels about a pixel sees the world; what lies outside the image does not.
-fn erode<T>(seen: &[(Sight, T)], width: usize, reach: usize) -> Vec<bool> {
-    let mut rows = vec![false; seen.len()];
-    for (source, row) in seen.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+/// Whether `is` holds, which is told by the number of a pixel, for all that are up to `reach` away from each along rows, columns and
+/// both; it does not for what lies outside the image.
+pub(crate) fn surrounded(is: impl Fn(usize) -> bool + Sync, size: [usize; 2], reach: usize) -> Vec<bool> {
+    let [width, height] = size;
+    let across: Vec<bool> = parallel::rows(size, |v, row| {
         let mut run = 0;
-        for (u, (sight, _)) in source.iter().enumerate() {
-            run = if *sight == Sight::None { 0 } else { run + 1 };
+        for u in 0..width {
+            run = if is(v * width + u) { run + 1 } else { 0 };
             if run > 2 * reach {
                 row[u - reach] = true;
             }
         }
-    }
-    let mut out = vec![false; seen.len()];
-    let mut runs = vec![0; width];
-    for (v, row) in rows.chunks_exact(width).enumerate() {
-        check();
-        for (u, (inside, run)) in row.iter().zip(&mut runs).enumerate() {
-            *run = if *inside { *run + 1 } else { 0 };
-            if *run > 2 * reach {
-                out[(v - reach) * width + u] = true;
+    });
+    parallel::rows(size, |v, row: &mut [bool]| {
+        if v >= reach && v + reach < height {
+            row.fill(true);
+            for other in across[(v - reach) * width..(v + reach + 1) * width].chunks_exact(width) {
+                row.iter_mut().zip(other).for_each(|(out, other)| *out &= *other);
             }
         }
-    }
-    out
+    })
 }
 
 #[cfg(test)]

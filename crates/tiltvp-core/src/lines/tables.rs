@@ -1,12 +1,11 @@
 //! Tables that a line extractor computes once for a camera: the pixels it looks at, their rays, and the elevations it sees.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Matrix3;
 
 use super::options::LineOptions;
-use crate::camera::Camera;
-use crate::edges::{EdgeOptions, LiftTable, NormalKind, Prefilter, Region};
+use crate::camera::{Camera, bearing_table};
+use crate::edges::{EdgeOptions, LiftTable, NormalKind, Prefilter, Region, surrounded, whole};
 use crate::error::Result;
-use crate::interrupt::check;
 
 /// The unit of a table of bearings: the largest that 16 bits hold for components from -1 to 1.
 const UNIT: f32 = 1.0 / 32767.0;
@@ -39,28 +38,14 @@ impl LineTables {
         let lift = LiftTable::new(camera, robot_from_camera, &region, NormalKind::Tangent);
         let prefilter = lift.prefilter(1.0);
         let (width, height) = (camera.width() as usize, camera.height() as usize);
-        let rays = (0..width * height).map(|i| {
-            if i.is_multiple_of(width) {
-                check();
-            }
-            let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
-            camera.unproject(&pixel).map_or([NO_RAY; 3], |ray| {
-                let ray = (robot_from_camera * ray) / f64::from(UNIT);
-                [ray.x, ray.y, ray.z].map(|x| x.round().clamp(-32767.0, 32767.0) as i16)
-            })
+        let rays = bearing_table(camera, robot_from_camera, |_, ray| {
+            ray.map_or([NO_RAY; 3], |ray| [ray.x, ray.y, ray.z].map(|x| whole(x / f64::from(UNIT)).max(-i16::MAX)))
         });
-        let rays: Vec<[i16; 3]> = rays.collect();
-        let usable = |u: usize, v: usize| {
-            rays[v * width + u][0] != NO_RAY && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
+        let usable = |i: usize| {
+            rays[i][0] != NO_RAY && options.mask.as_ref().is_none_or(|mask| mask.usable(i % width, i / width))
         };
-        let mut clear = vec![0; width * height];
-        for v in 1..height.saturating_sub(1) {
-            for u in 1..width.saturating_sub(1) {
-                let sees = (v - 1..=v + 1).all(|y| (u - 1..=u + 1).all(|x| usable(x, y)));
-                clear[v * width + u] = u8::MAX * u8::from(sees);
-            }
-        }
-        let clearance = distances(clear, width);
+        let clear = surrounded(usable, [width, height], 1);
+        let clearance = distances(clear.into_iter().map(|sees| u8::MAX * u8::from(sees)).collect(), width);
         let band = band_of(&region);
         Ok(Self { region, prefilter, rays, clearance, width, height, band })
     }
@@ -103,11 +88,13 @@ fn distances(mut values: Vec<u8>, width: usize) -> Vec<u8> {
 fn band_of(region: &Region) -> (f64, f64) {
     const SECTORS: usize = 90;
     let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); SECTORS];
-    for (_, _, ray) in region.pixels() {
+    let of_each = region.bearing_table(|ray| {
         let turn = ray.y.atan2(ray.x) / std::f64::consts::TAU + 0.5;
-        let sector = &mut seen[((turn * SECTORS as f64) as usize).min(SECTORS - 1)];
-        let elevation = ray.z.atan2(ray.xy().norm());
-        *sector = (sector.0.min(elevation), sector.1.max(elevation));
+        (((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8, ray.z.atan2(ray.xy().norm()) as f32)
+    });
+    for (sector, elevation) in of_each {
+        let (low, high) = &mut seen[usize::from(sector)];
+        (*low, *high) = (low.min(f64::from(elevation)), high.max(f64::from(elevation)));
     }
     let sorted = |pick: fn(&(f64, f64)) -> f64| {
         let mut values: Vec<f64> = seen.iter().filter(|sector| sector.0 <= sector.1).map(pick).collect();

@@ -1,10 +1,10 @@
 //! Bearings of places between pixel centres, from a quadratic for each small square of the image.
 
-use nalgebra::{Matrix6, SMatrix, Vector2, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector6};
 use tiltvp_kernels::quadratic::{Grid, Located, PER_PIXEL, Quadratic, SIDE, evaluate};
 
 use super::chains::Window;
-use crate::camera::Camera;
+use crate::camera::{Camera, STEP, bearings, cubic};
 use crate::edges::RidgePixels;
 use crate::parallel;
 
@@ -17,6 +17,8 @@ const BLOCK: usize = 128;
 /// Least number of answers of the lens in a square, for six unknowns.
 const ANSWERS_MIN: usize = 8;
 
+const _: () = assert!(SIDE == STEP);
+
 /// The bearings of a window in the camera frame; NaN where the lens has no answer.
 #[derive(Debug, Clone)]
 pub(super) struct Bearings {
@@ -27,10 +29,27 @@ pub(super) struct Bearings {
 impl Bearings {
     pub(super) fn new(camera: &Camera, window: &Window) -> Self {
         let Window { left, top, width, height } = *window;
-        let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
-        let square = |i: usize| quadratic(camera, (left + i % across * SIDE) as f64, (top + i / across * SIDE) as f64);
+        let [first, end] = [[left, top], [left + width, top + height]];
+        let [first, end] = [first.map(|side| side / SIDE), end.map(|side| side.div_ceil(SIDE))];
+        let [across, down] = [end[0] - first[0], end[1] - first[1]];
+        let lens = bearings(camera, &Matrix3::identity());
+        // What each node adds to the quadratic where the cubics hold, so that the lens need not be asked 25 times.
+        let of_nodes = fitted(|at| {
+            let [across, down] = at.map(|at| cubic(at / SIDE as f64));
+            Some(SVector::<f64, 16>::from_fn(|k, _| down[k / 4] * across[k % 4]))
+        });
+        let square = |i: usize| {
+            let number = [first[0] + i % across, first[1] + i / across];
+            let [u, v] = number.map(|number| (number * SIDE) as f64);
+            kept(match (lens.around(number), &of_nodes) {
+                (Some(nodes), Some(of_nodes)) => {
+                    Some(of_nodes * SMatrix::<f64, 3, 16>::from_columns(&nodes).transpose())
+                }
+                _ => fitted(|[du, dv]| camera.unproject(&Vector2::new(u + du, v + dv))),
+            })
+        };
         let squares = parallel::table_in_blocks(across * down, BLOCK, square);
-        Self { squares, grid: Grid { origin: [left as u32, top as u32], across: across as u32 } }
+        Self { squares, grid: Grid { origin: first.map(|side| (side * SIDE) as u32), across: across as u32 } }
     }
 
     /// Writes down where the edge passes each ridge pixel.
@@ -57,25 +76,27 @@ impl Bearings {
     }
 }
 
-/// Least squares of a square whose first pixel is `(u, v)`, over the places where the lens has an answer.
-fn quadratic(camera: &Camera, u: f64, v: f64) -> Quadratic {
-    let (mut moments, mut sums, mut answers) = (Matrix6::zeros(), SMatrix::<f64, 6, 3>::zeros(), 0);
+/// Least squares over the places of a square, told from its first pixel, where there is a value.
+fn fitted<const N: usize>(value: impl Fn([f64; 2]) -> Option<SVector<f64, N>>) -> Option<SMatrix<f64, 6, N>> {
+    let (mut moments, mut sums, mut answers) = (Matrix6::zeros(), SMatrix::<f64, 6, N>::zeros(), 0);
     let step = SIDE as f64 / SAMPLES as f64;
     for i in 0..SAMPLES * SAMPLES {
-        let at = |k: usize| (k as f64 + 0.5) * step - 0.5;
-        let (du, dv) = (at(i % SAMPLES), at(i / SAMPLES));
-        if let Some(bearing) = camera.unproject(&Vector2::new(u + du, v + dv)) {
-            let middle = 0.5 * (SIDE - 1) as f64;
-            let (x, y) = ((du - middle) * f64::from(PER_PIXEL), (dv - middle) * f64::from(PER_PIXEL));
+        let at = [i % SAMPLES, i / SAMPLES].map(|k| (k as f64 + 0.5) * step - 0.5);
+        if let Some(value) = value(at) {
+            let [x, y] = at.map(|at| (at - 0.5 * (SIDE - 1) as f64) * f64::from(PER_PIXEL));
             let row = Vector6::new(1.0, x, y, x * x, x * y, y * y);
             moments += row * row.transpose();
-            sums += row * bearing.transpose();
+            sums += row * value.transpose();
             answers += 1;
         }
     }
-    let solved = if answers < ANSWERS_MIN { None } else { moments.cholesky().map(|cholesky| cholesky.solve(&sums)) };
+    if answers < ANSWERS_MIN { None } else { moments.cholesky().map(|cholesky| cholesky.solve(&sums)) }
+}
+
+/// The quadratic as it is kept; NaN where there is none.
+fn kept(coefficients: Option<SMatrix<f64, 6, 3>>) -> Quadratic {
     let mut out = [[f32::NAN; 4]; 6];
-    if let Some(coefficients) = solved {
+    if let Some(coefficients) = coefficients {
         for (own, row) in out.iter_mut().zip(coefficients.row_iter()) {
             *own = [row[0] as f32, row[1] as f32, row[2] as f32, 0.0];
         }

@@ -12,11 +12,18 @@ pub(super) struct SharedTables {
     pub image_space: ImageSpaceTables,
 }
 
-/// The maps from gradients to normals and their prefilters, by the kind of normal.
+/// By the kind of normal.
 #[derive(Debug, Default)]
 pub(super) struct NormalTables {
-    pub tangent: OnceLock<(Arc<LiftTable>, Prefilter)>,
-    pub gradient: OnceLock<(Arc<LiftTable>, Prefilter)>,
+    pub tangent: NormalTable,
+    pub gradient: NormalTable,
+}
+
+/// The maps from gradients to normals, and their prefilter.
+#[derive(Debug, Default)]
+pub(super) struct NormalTable {
+    pub maps: OnceLock<Arc<LiftTable>>,
+    pub prefilter: OnceLock<Prefilter>,
 }
 
 /// The closed-form gains, and the prefilter of edge offsets.

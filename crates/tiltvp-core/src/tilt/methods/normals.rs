@@ -10,6 +10,7 @@ use crate::edges::{EdgePixels, LiftTable, NormalKind, Prefilter};
 use crate::geometry::Tilt;
 use crate::robust::FitReport;
 use crate::tilt::fit::{Evidence, Fit, Lean};
+use crate::tilt::shared_tables::NormalTable;
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
 use crate::tilt::work::{Inliers, Work};
@@ -18,30 +19,30 @@ use crate::tilt::work::{Inliers, Work};
 #[derive(Debug)]
 pub(super) struct Normals {
     table: Arc<LiftTable>,
-    prefilter: Prefilter,
+    prefilter: Option<Prefilter>,
     sin_max: f64,
 }
 
 impl Normals {
     /// The normals of a kind for edges of leans of up to `limit_rad`.
     pub(super) fn new(setting: &Setting<'_>, kind: NormalKind, limit_rad: f64) -> Self {
-        let sin_max = limit_rad.sin();
-        let shared = &setting.pixels.shared.normals;
-        let made = match kind {
-            NormalKind::Tangent => &shared.tangent,
-            NormalKind::Gradient => &shared.gradient,
-        };
-        let (table, prefilter) = made.get_or_init(|| {
-            let (camera, rotation) = (&setting.origin.camera, &setting.origin.robot_from_camera);
-            let table = LiftTable::new(camera, rotation, &setting.pixels.region, kind);
-            let prefilter = table.prefilter(sin_max);
-            (Arc::new(table), prefilter)
-        });
-        Self { table: Arc::clone(table), prefilter: prefilter.with_limit(sin_max), sin_max }
+        let made = Self::without_prefilter(setting, kind, limit_rad);
+        let shared = &shared(setting, kind).prefilter;
+        let prefilter = shared.get_or_init(|| made.table.prefilter(made.sin_max)).with_limit(made.sin_max);
+        Self { prefilter: Some(prefilter), ..made }
     }
 
-    pub(super) fn prefilter(&self) -> &Prefilter {
-        &self.prefilter
+    /// The same for edge pixels that others find.
+    pub(super) fn without_prefilter(setting: &Setting<'_>, kind: NormalKind, limit_rad: f64) -> Self {
+        let table = shared(setting, kind).maps.get_or_init(|| {
+            let (camera, rotation) = (&setting.origin.camera, &setting.origin.robot_from_camera);
+            Arc::new(LiftTable::new(camera, rotation, &setting.pixels.region, kind))
+        });
+        Self { table: Arc::clone(table), prefilter: None, sin_max: limit_rad.sin() }
+    }
+
+    pub(super) fn prefilter(&self) -> Option<&Prefilter> {
+        self.prefilter.as_ref()
     }
 
     /// The unit normal of one edge pixel.
@@ -53,6 +54,14 @@ impl Normals {
     pub(super) fn lift(&self, edges: &EdgePixels, work: &mut Work) {
         let Work { rows, weights, slots, places, .. } = work;
         self.table.lift(edges, self.sin_max, rows, weights, slots, places);
+    }
+}
+
+fn shared<'a>(setting: &Setting<'a>, kind: NormalKind) -> &'a NormalTable {
+    let normals = &setting.pixels.shared.normals;
+    match kind {
+        NormalKind::Tangent => &normals.tangent,
+        NormalKind::Gradient => &normals.gradient,
     }
 }
 

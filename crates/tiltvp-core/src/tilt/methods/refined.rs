@@ -71,10 +71,23 @@ pub(super) struct Refined {
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
+        Self::by(setting, options, Normals::new)
+    }
+
+    /// The method for edge pixels that others find.
+    pub(super) fn of_found(setting: &Setting<'_>, options: RefineOptions) -> Self {
+        Self::by(setting, options, Normals::without_prefilter)
+    }
+
+    fn by(
+        setting: &Setting<'_>,
+        options: RefineOptions,
+        normals: fn(&Setting<'_>, NormalKind, f64) -> Normals,
+    ) -> Self {
         // Edges stray: those of the largest lean do to either side of it.
         let searched_rad = setting.searched_rad(TILT_MAX_RAD);
         let edges_rad = (searched_rad + options.scale_rad).min(FRAC_PI_2);
-        let normals = Normals::new(setting, NormalKind::Tangent, edges_rad);
+        let normals = normals(setting, NormalKind::Tangent, edges_rad);
         let as_near = TILT_MAX_RAD / searched_rad;
         Self { normals, options, lean_limits_rad: [TILT_MAX_RAD, edges_rad], as_near }
     }
@@ -99,7 +112,7 @@ impl Refined {
 
 impl Fitter for Refined {
     fn prefilter(&self) -> Option<&Prefilter> {
-        Some(self.normals.prefilter())
+        self.normals.prefilter()
     }
 
     fn trust(&self) -> Option<&'static Trust> {

@@ -100,7 +100,7 @@ struct VectorConsensus {
 
 impl Fitter for VectorConsensus {
     fn prefilter(&self) -> Option<&Prefilter> {
-        Some(self.normals.prefilter())
+        self.normals.prefilter()
     }
 
     fn trust(&self) -> Option<&'static Trust> {

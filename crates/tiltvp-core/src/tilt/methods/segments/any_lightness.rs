@@ -32,9 +32,10 @@ impl Sample {
         let step = ((region.len() as f64 / SAMPLED).sqrt().round() as usize).max(1);
         let on_grid = |(u, v): (usize, usize)| u % step == step / 2 && v % step == step / 2;
         let (pixels, bearings) = region
-            .pixels()
-            .filter(|(u, v, _)| on_grid((*u, *v)))
-            .map(|(u, v, bearing)| ((u, v), bearing.cast()))
+            .places()
+            .enumerate()
+            .filter(|(_, place)| on_grid(*place))
+            .map(|(slot, place)| (place, region.bearing(slot).cast()))
             .unzip();
         Self { pixels, bearings }
     }

@@ -4,7 +4,6 @@ use nalgebra::Matrix2;
 
 use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
 use crate::geometry::{Tilt, tangent_basis};
-use crate::parallel;
 use crate::tilt::fit::Fit;
 use crate::tilt::methods::method::{Setting, TiltMethod};
 use crate::tilt::methods::refined::{RefineOptions, Refined};
@@ -31,8 +30,8 @@ impl Vote {
         let refined = RefineOptions::default();
         let (strong, region) = (refined.edges(), &setting.pixels.region);
         let heights = strong.elevation_min_rad.sin()..=strong.elevation_max_rad.sin();
-        let in_band = parallel::table(region.len(), |slot| heights.contains(&region.bearing(slot).z));
-        Self { pixels: Refined::new(setting, refined), strong, in_band }
+        let in_band = region.bearing_table(|bearing| heights.contains(&bearing.z));
+        Self { pixels: Refined::of_found(setting, refined), strong, in_band }
     }
 
     /// What the strong ridge pixels near the horizon say by their gradients.
