@@ -89,8 +89,8 @@ impl Track {
     }
 
     /// How likely a pose is the next one, from 0 to 1: near where the same corner was, or, which counts less, near where another
-    /// one of the object has been seen before, or, if it `fits_well`, of any other one. None if it is none of them.
-    pub(crate) fn likelihood(&self, pose: &Hypothesis, fits_well: bool) -> Option<f64> {
+    /// one of the object has been seen before, or, if it `fits_alone`, of any other one. None if it is none of them.
+    pub(crate) fn likelihood(&self, pose: &Hypothesis, fits_alone: bool) -> Option<f64> {
         let (Some(last), Some(vertex)) = (self.pose.vertex_m, pose.vertex_m) else { return Some(1.0) };
         let known = self.others.iter().filter(|other| other.seen >= SEEN_MIN);
         let others = known.map(|other| (KNOWN_CORNER, last + self.pose.camera_from_object * other.place_m));
@@ -103,7 +103,7 @@ impl Track {
         std::iter::once((1.0, last))
             .chain(others)
             .filter_map(near)
-            .chain(fits_well.then_some(NEW_CORNER))
+            .chain(fits_alone.then_some(NEW_CORNER))
             .max_by(f64::total_cmp)
     }
 
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn the_followed_corner_comes_before_known_ones_and_these_before_new_ones() {
         let track = followed(SEEN_MIN);
-        let at = |x: f64, fits_well| track.likelihood(&pose(Vector3::new(x, 0.0, 2.0)), fits_well);
+        let at = |x: f64, fits_alone| track.likelihood(&pose(Vector3::new(x, 0.0, 2.0)), fits_alone);
         let (same, jumped, known) = (at(0.03, false).unwrap(), at(0.15, false).unwrap(), at(0.53, false).unwrap());
         assert!(same > 2.0 * jumped && same > 2.0 * known && known > at(-0.5, true).unwrap());
         assert_eq!(at(-0.5, false), None);
