@@ -68,6 +68,16 @@ def test_a_misread_log_is_refused_and_named(
     assert "static_transform_publisher" in capsys.readouterr().out
 
 
+def test_a_camera_that_creeps_is_named() -> None:
+    for seed in (2, 3):
+        drive = one("camera creeps by 3 degrees", seed)
+        found = tiltvp.calibrate(drive.odometry, drive.bearings, **drive.options)
+        assert found.mounting.suspect == "creep"
+        assert "works loose" in found.reason
+        turned = drive.truth[2] - one(UNDISTURBED, seed).truth[2]
+        assert found.mounting.suspect_value == pytest.approx(turned, abs=math.radians(2.0))
+
+
 @pytest.mark.slow
 def test_two_landmarks_under_one_name_are_taken_apart() -> None:
     """Of drives that were wrong and sure: x, y or yaw was off by 5.2 to 6.8 standard deviations of the bound."""

@@ -2189,16 +2189,16 @@ class MountingEstimate:
         """What is most likely wrong where the log does not fit: "turns" (a sign or a unit), "outliers" (a bump, or
         names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left",
         "time_offset_s", "centre" (another image centre, or a camera that leans), "rolling_shutter" (lines are seen
-        later on one side than on the other) or "drift" (motions of a part of the drive that err together). None if
-        nothing is.
+        later on one side than on the other), "creep" (the camera turns all along the drive) or "drift" (motions of a
+        part of the drive that err together). None if nothing is.
         """
 
     @property
     def suspect_value(self) -> float | None:
         """The value that would suit the log better, of what `suspect` names (times in steps, or in seconds in a log
         with times); of "turns", "outliers" and "slips" their share, of "bump" its angle and of "centre" the largest
-        error of a bearing in radians, of "rolling_shutter" how much later lines are seen on one side, of "drift" the
-        factor of a standard deviation.
+        error of a bearing in radians, of "rolling_shutter" how much later lines are seen on one side, of "creep" the
+        angle in radians from the first step to the last, of "drift" the factor of a standard deviation.
         """
 
     def to_dict(self) -> dict[str, Any]:

@@ -149,11 +149,7 @@ impl SelfCalibrator {
                     filter.monitor().alarmed(),
                 )
                 .judged(examination.contradictions, examination.suspect)
-                .doubting(
-                    examination.doubted_once_round.as_ref(),
-                    || filter.covariance_as_told(),
-                    start,
-                )
+                .doubting(examination.doubted_of_camera.first(), || filter.covariance_as_told(), start)
             }
             Filter::Paper(filter, monitor) => {
                 let nis = monitor.mean_nis();

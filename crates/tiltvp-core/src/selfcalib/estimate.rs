@@ -59,7 +59,7 @@ impl MountingEstimate {
         Self { contradictions, suspect, ..self }
     }
 
-    /// This estimate with the image centre or the shutter suspect, where its doubt alone is why not everything is determined: with the
+    /// This estimate with what is doubted of the camera suspect, where its doubt alone is why not everything is determined: with the
     /// covariance `known` of one as told, and that at the start, everything is.
     pub(crate) fn doubting(
         self,
@@ -70,7 +70,7 @@ impl MountingEstimate {
         let determined = || Observability::new(&self.mounting, &known(), start).complete();
         match doubted {
             Some(doubted) if self.suspect.is_none() && !self.observability.complete() && determined() => {
-                Self { suspect: doubted.once_round(), ..self }
+                Self { suspect: doubted.of_camera(), ..self }
             }
             _ => self,
         }

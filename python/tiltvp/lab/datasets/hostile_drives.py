@@ -121,6 +121,17 @@ def _bumped(log: _Log) -> None:
     log.mounting = moved
 
 
+def _creeping(turn: float) -> _Case:
+    """All along the drive the camera turns on, by so many degrees; the truth is where it is at the end."""
+
+    def harm(log: _Log) -> None:
+        by = math.radians(turn) * log.rng.choice([-1.0, 1.0])
+        log.bearings[:, 2] -= by * log.bearings[:, 0] / (len(log.odometry) - 1)
+        log.mounting = log.mounting + [0.0, 0.0, by]
+
+    return _Case(harm)
+
+
 def _slips(log: _Log) -> None:
     """Three times a wheel runs on by up to 15 cm."""
     for step in log.rng.choice(len(log.odometry), 3, replace=False):
@@ -187,6 +198,8 @@ DRIVE_CASES: Final = {
     "a tenth of the names wrong": _Case(_confused),
     "two landmarks merged": _Case(_merged),
     "camera bumped": _Case(_bumped),
+    "camera creeps by 1 degree": _creeping(1.0),
+    "camera creeps by 3 degrees": _creeping(3.0),
     "image centre off by 0.5 px": _off_centre(0.5),
     "image centre off by 1 px": _off_centre(1.0),
     "image centre off by 2 px": _off_centre(2.0),

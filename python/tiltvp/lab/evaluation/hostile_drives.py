@@ -38,6 +38,7 @@ CAUSES: Final = {
     "images 0.2 s late": "later than the odometry",
     "images mirrored": "wheels swapped",
     "camera bumped": "bump",
+    "camera creeps": "works loose",
     "two landmarks merged": "under one name",
     "rows read": "rolling shutter",
     "image centre": "image centre",

@@ -12,15 +12,21 @@ pub(crate) struct FreeParameters {
     /// How much later lines are seen on one side of the camera than on the other; looked for, not estimated.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) shutter: bool,
+    /// By how much the camera turned all along the drive, up to the last keyframe; looked for, not estimated.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) creep: bool,
 }
 
 impl FreeParameters {
     /// All that is estimated.
-    pub(crate) const ALL: Self = Self { wheels: true, offset: true, centre: true, shutter: false };
+    pub(crate) const ALL: Self = Self { wheels: true, offset: true, centre: true, shutter: false, creep: false };
+
+    /// All that is estimated or looked for.
+    pub(crate) const ALL_LOOKED_FOR: Self = Self { shutter: true, creep: true, ..Self::ALL };
 
     /// The number of calibration parameters; those of the landmarks follow.
     pub(crate) fn width(self) -> usize {
-        self.shutter_at() + 2 * usize::from(self.shutter)
+        self.creep_at() + usize::from(self.creep)
     }
 
     /// The place of the time offset among them.
@@ -36,5 +42,10 @@ impl FreeParameters {
     /// The place of the rolling shutter among them.
     pub(crate) fn shutter_at(self) -> usize {
         self.centre_at() + 2 * usize::from(self.centre)
+    }
+
+    /// The place of the creep among them.
+    pub(crate) fn creep_at(self) -> usize {
+        self.shutter_at() + 2 * usize::from(self.shutter)
     }
 }

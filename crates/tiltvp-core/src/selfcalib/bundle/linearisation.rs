@@ -35,7 +35,7 @@ pub(crate) struct BearingRow {
     pub(crate) by_pose: Vector3<f64>,
     /// By the pose of the keyframe's [neighbour](BundleProblem::neighbour).
     pub(crate) by_neighbour: Vector3<f64>,
-    pub(crate) by_calibration: [f64; 10],
+    pub(crate) by_calibration: [f64; 11],
     /// The place of its landmark among the shared parameters.
     pub(crate) at: usize,
     pub(crate) by_landmark: [f64; 2],
@@ -125,12 +125,14 @@ impl BundleProblem {
         let (pose, by) = self.observation_pose(at);
         let view = Viewpoint::new(&pose, &self.mounting);
         let calibration_width = self.free.width();
+        // The mounting is that at the last keyframe.
+        let yet_to_creep = at as f64 / (self.keyframes.len() - 1).max(1) as f64 - 1.0;
         for observation in &self.keyframes[at].observations {
             let point = &points[observation.landmark];
             let p = view.jacobians(point);
             let s = 1.0 / (self.bearing_sigma * self.scatters[observation.landmark]);
             let residual = view.residual(point, &observation.about(&self.centre).along) * s;
-            let mut by_calibration = [0.0; 10];
+            let mut by_calibration = [0.0; 11];
             by_calibration[..3].copy_from_slice((p.by_mounting * s).as_slice());
             let (mut by_pose, mut by_neighbour) = (p.by_pose * s, Vector3::zeros());
             if let Some(by) = &by {
@@ -148,6 +150,9 @@ impl BundleProblem {
             if self.free.centre {
                 let at = self.free.centre_at();
                 by_calibration[at..at + 2].copy_from_slice((observation.by_centre() * s).as_slice());
+            }
+            if self.free.creep {
+                by_calibration[self.free.creep_at()] = p.by_mounting.z * s * yet_to_creep;
             }
             each(&BearingRow {
                 by_pose,

@@ -51,11 +51,12 @@ pub(crate) struct BundleProblem {
 }
 
 /// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base), on the time offset, and that of a rolling shutter from
-/// the middle to the lines, seconds, and on the image centre. Wheels are known to 20 %, clocks to a second and centres to a tenth of the radius
-/// at worst. A drive determines them a hundred times better, so that the priors only keep the equations regular.
+/// the middle to the lines, seconds, on the image centre, and on a turn of the camera all along the drive. Wheels are known to 20 %, clocks to a
+/// second, centres to a tenth of the radius and screws to 12 degrees at worst. A drive determines them a hundred times better, so that the priors only keep the equations regular.
 const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
 const OFFSET_SIGMA_S: f64 = 1.0;
 const CENTRE_SIGMA: f64 = 0.1;
+const CREEP_SIGMA_RAD: f64 = 0.2;
 
 /// Jacobians of the pose of an observation.
 pub(crate) struct ObservationPoseJacobians {
@@ -176,6 +177,10 @@ impl BundleProblem {
         if free.shutter && !problem.free.shutter {
             insert(problem.free.shutter_at(), &[(0.0, OFFSET_SIGMA_S); 2]);
             problem.free.shutter = true;
+        }
+        if free.creep && !problem.free.creep {
+            insert(problem.free.creep_at(), &[(0.0, CREEP_SIGMA_RAD)]);
+            problem.free.creep = true;
         }
         problem
     }

@@ -328,8 +328,8 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_differences_by_pose_neighbour_time_and_centre() {
-        let mut problem = drive(FreeParameters { shutter: true, ..FreeParameters::ALL });
+    fn rows_are_differences_by_pose_neighbour_time_centre_and_creep() {
+        let mut problem = drive(FreeParameters::ALL_LOOKED_FOR);
         let uneven = Vector3::new(0.01, 0.0, -0.02);
         problem.keyframes[3].unevenness = [uneven, -uneven];
         let h = 1e-6;
@@ -353,6 +353,7 @@ mod tests {
                         [0, 1, 2].map(|axis| difference(&|problem, by| problem.keyframes[pose].pose[axis] += by))
                     })
                 });
+                let by_yaw = difference(&|problem, by| problem.mounting.z += by);
                 let mut row = 0;
                 let seen = &problem.keyframes[at].observations;
                 problem.for_each_bearing_row(at, &problem.homogeneous_landmarks(), |given| {
@@ -361,6 +362,8 @@ mod tests {
                     for (axis, share) in seen[row].along.iter().enumerate() {
                         assert!((given.by_calibration[8 + axis] - by_time[row] * share).abs() < 1e-5);
                     }
+                    // At the last keyframe the camera has turned as far as it does, at the first not at all.
+                    assert!((given.by_calibration[10] - by_yaw[row] * (at as f64 / 31.0 - 1.0)).abs() < 1e-5);
                     for (axis, by_axis) in by_centre.iter().enumerate() {
                         assert!((given.by_calibration[6 + axis] - by_axis[row]).abs() < 1e-5);
                     }

@@ -1,4 +1,4 @@
-//! How far the wheels, the clock, the image centre and the shutter are from what is assumed, by the score of the solution with each of them free.
+//! How far the wheels, the clock, the image centre, the shutter and a camera that keeps its direction are from what is assumed, by the score of the solution with each of them free.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -14,6 +14,7 @@ pub(crate) enum Assumed {
     TimeOffset,
     Centre,
     Shutter,
+    Creep,
 }
 
 /// What one of them would be if it were free.
@@ -21,7 +22,8 @@ pub(crate) enum Assumed {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Deviation {
     pub(crate) of: Assumed,
-    /// How far it is off: of the wheel base in units of that, of the centre the distance, of the shutter seconds from the middle to the lines.
+    /// How far it is off: of the wheel base in units of that, of the centre the distance, of the shutter seconds from the middle to the lines, of the creep the turn
+    /// from the first keyframe to the last.
     pub(crate) value: f64,
     /// The same in standard deviations.
     pub(crate) sigmas: f64,
@@ -31,24 +33,24 @@ pub(crate) struct Deviation {
     pub(crate) scatter: Matrix3<f64>,
 }
 
-/// Standard deviations of the image centre, or of a rolling shutter, from which on the mounting is stated no more surely than with it free.
+/// Standard deviations of the image centre, of a rolling shutter, or of a creep, from which on the mounting is stated no more surely than with it free.
 /// The mounting follows either by two of its own for each: of 40 drives with a centre off by half a pixel in 150, and not named, 13 errors were
 /// beyond what 99.9 % are within, with this 5.
 const DOUBTED_SIGMAS: f64 = 2.0;
 
-/// What errs once round the camera, the image centre or the shutter, where one is doubted: the more significant one. Noise has so many times
-/// the variance that is told.
-pub(crate) fn doubted_once_round(deviations: &[Deviation], excess: f64) -> Option<&Deviation> {
-    let once_round = deviations.iter().filter(|deviation| deviation.of.errs_once_round());
-    once_round
-        .filter(|deviation| deviation.sigmas > DOUBTED_SIGMAS * excess.sqrt())
-        .max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
+/// What is doubted of the camera, of its image centre, its shutter and its creep, the most significant one first. Noise has so many times the
+/// variance that is told.
+pub(crate) fn doubted_of_camera(deviations: &[Deviation], excess: f64) -> Vec<Deviation> {
+    let is_doubted = |d: &&Deviation| d.of.is_of_camera() && d.sigmas > DOUBTED_SIGMAS * excess.sqrt();
+    let mut doubted: Vec<Deviation> = deviations.iter().filter(is_doubted).cloned().collect();
+    doubted.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+    doubted
 }
 
 impl Assumed {
-    /// Whether bearings err once round the camera where it is another one, which the mounting follows more than anything else.
-    pub(super) fn errs_once_round(self) -> bool {
-        matches!(self, Self::Centre | Self::Shutter)
+    /// Whether it is of the camera, not of the wheels or the clock. The mounting follows these more than anything else.
+    pub(super) fn is_of_camera(self) -> bool {
+        matches!(self, Self::Centre | Self::Shutter | Self::Creep)
     }
 }
 
@@ -60,7 +62,7 @@ impl BundleProblem {
     /// Of the time offset it is the more significant one of early and of late bearings.
     pub(crate) fn deviations(&self, covariance: &Matrix3<f64>, excess: f64) -> Vec<Deviation> {
         let covariance = &(covariance * excess);
-        let mut problem = self.with_free(FreeParameters { shutter: true, ..FreeParameters::ALL });
+        let mut problem = self.with_free(FreeParameters::ALL_LOOKED_FOR);
         problem.as_wheels_read = !self.free.offset;
         problem.turns_as_read = true;
         // What outliers pull is no deviation.
@@ -79,13 +81,14 @@ impl BundleProblem {
         let Some(system) = problem.eliminate_poses(self.keyframes.len() - 1, false, 0.0) else { return Vec::new() };
         let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
         let free = problem.free;
-        let (offset, centre, shutter) = (free.offset_at(), free.centre_at(), free.shutter_at());
+        let (offset, centre, shutter, creep) = (free.offset_at(), free.centre_at(), free.shutter_at(), free.creep_at());
         let all = [
             (Assumed::Imbalance, 3..4, self.free.wheels),
             (Assumed::WheelBase, 4..5, self.free.wheels),
             (Assumed::TimeOffset, offset..offset + 1, self.free.offset),
             (Assumed::Centre, centre..centre + 2, self.free.centre),
             (Assumed::Shutter, shutter..shutter + 2, self.free.shutter),
+            (Assumed::Creep, creep..creep + 1, self.free.creep),
         ];
         let one = |k: usize| {
             let (of, own, is_free) = &all[k];

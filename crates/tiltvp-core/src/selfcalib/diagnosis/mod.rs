@@ -7,7 +7,7 @@ mod noise;
 mod suspect;
 
 pub use self::contradictions::Contradictions;
-pub(super) use self::deviations::{Assumed, Deviation, doubted_once_round};
+pub(super) use self::deviations::{Assumed, Deviation, doubted_of_camera};
 pub(super) use self::noise::NoiseFactors;
 pub(super) use self::suspect::DEVIATION_SIGMAS;
 pub use self::suspect::{Cause, Suspect};

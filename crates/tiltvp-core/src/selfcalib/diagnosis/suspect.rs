@@ -27,6 +27,9 @@ const DEVIATION_SHIFT: f64 = 1.0;
 /// else, by two standard deviations for each of their own.
 const ONCE_ROUND_SIGMAS: f64 = 3.035;
 
+/// The same of a creep: 99.7 % of normal numbers are within.
+const CREEP_SIGMAS: f64 = 3.0;
+
 /// Ratio of a standard deviation as motions of parts of the drive scatter to what their noise makes, beyond which the drive is not the
 /// same throughout. Of 300 simulated drives whose motions err alone none is above 3.8.
 const MOST_DRIFT: f64 = 5.0;
@@ -57,15 +60,17 @@ words! {
         Centre = "centre",
         /// Lines are seen later on one side of the camera than on the other: rows that are read one after another.
         Shutter = "rolling_shutter",
+        /// The camera turns all along the drive: a mount that works loose.
+        Creep = "creep",
         /// The motions of a part of the drive err together: a carpet, a tyre that loses air.
         Drift = "drift",
     }
 }
 
 impl Cause {
-    /// Whether it makes bearings err once round the camera, all along the drive.
-    pub(crate) fn errs_once_round(self) -> bool {
-        matches!(self, Self::Centre | Self::Shutter)
+    /// Whether it is of the camera, all along the drive.
+    pub(crate) fn is_of_camera(self) -> bool {
+        matches!(self, Self::Centre | Self::Shutter | Self::Creep)
     }
 }
 
@@ -77,7 +82,7 @@ pub struct Suspect {
     pub cause: Cause,
     /// The number that would suit, times in steps, or in seconds in a log with times; of `turns`, `outliers` and `slips` the share that is
     /// contradicted, of `bump` the angle in radians, of `centre` the largest error of a bearing in radians, of `rolling_shutter` by how much
-    /// later lines are seen on one side, of `drift` the factor of a standard deviation.
+    /// later lines are seen on one side, of `creep` the angle in radians from the first keyframe to the last, of `drift` the factor of a standard deviation.
     pub value: f64,
 }
 
@@ -118,6 +123,11 @@ impl fmt::Display for Suspect {
                 f,
                 "lines seem to be seen {value:.3} steps (seconds, with times) later on one side of the camera than on the other, as through a rolling shutter: drive more slowly"
             ),
+            Cause::Creep => write!(
+                f,
+                "the camera seems to have turned by {:.2} degrees along the drive, as on a mount that works loose: fasten it, and calibrate anew",
+                value.to_degrees()
+            ),
             Cause::Drift => write!(
                 f,
                 "motions of a part of the drive err together, as on a carpet: deviations are {value:.1} times those of motions that err alone"
@@ -131,12 +141,13 @@ impl fmt::Display for Suspect {
 }
 
 impl Deviation {
-    /// The suspect of what errs once round the camera, none of others.
-    pub(crate) fn once_round(&self) -> Option<Suspect> {
+    /// The suspect of what is of the camera, none of others.
+    pub(crate) fn of_camera(&self) -> Option<Suspect> {
         match self.of {
             Assumed::Centre => Some(Suspect { cause: Cause::Centre, value: self.value }),
             // From side to side it is twice that from the middle.
             Assumed::Shutter => Some(Suspect { cause: Cause::Shutter, value: 2.0 * self.value }),
+            Assumed::Creep => Some(Suspect { cause: Cause::Creep, value: self.value }),
             _ => None,
         }
     }
@@ -160,7 +171,11 @@ impl BundleProblem {
             return found(Cause::Turns, share(counts.contradicted_turns, counts.turns));
         }
         let excess = factors.excess();
-        let most = |d: &Deviation| if d.of.errs_once_round() { ONCE_ROUND_SIGMAS } else { DEVIATION_SIGMAS };
+        let most = |d: &Deviation| match d.of {
+            Assumed::Centre | Assumed::Shutter => ONCE_ROUND_SIGMAS,
+            Assumed::Creep => CREEP_SIGMAS,
+            _ => DEVIATION_SIGMAS,
+        };
         let worst = deviations
             .iter()
             .filter(|d| d.sigmas > most(d) * excess.sqrt() && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
@@ -171,8 +186,8 @@ impl BundleProblem {
                 // Readings are linear in the base; below zero where they turn to the other side.
                 Assumed::WheelBase => found(Cause::WheelBase, self.wheels.base_m * (1.0 + d.value).abs()),
                 Assumed::TimeOffset => found(Cause::TimeOffset, d.value),
-                // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre.
-                Assumed::Centre | Assumed::Shutter => bump().or_else(|| d.once_round()),
+                // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre, and turns it.
+                Assumed::Centre | Assumed::Shutter | Assumed::Creep => bump().or_else(|| d.of_camera()),
             };
         }
         if factors.bearings > 1.0 {

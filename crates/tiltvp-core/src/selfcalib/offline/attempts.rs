@@ -66,6 +66,7 @@ pub(super) fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProb
         offset: options.estimate_time_offset,
         centre: options.estimate_centre,
         shutter: false,
+        creep: false,
     };
     let with_wheels = FreeParameters { wheels: true, ..asked };
     let start = options.filter.start.vector();

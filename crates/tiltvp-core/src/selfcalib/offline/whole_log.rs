@@ -12,7 +12,7 @@ use super::misreading::Misreading;
 use super::noise::{solve_with_doubt, solve_with_noise};
 use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FreeParameters, widened};
-use crate::selfcalib::diagnosis::{Assumed, Cause, DEVIATION_SIGMAS, Deviation, doubted_once_round};
+use crate::selfcalib::diagnosis::{Assumed, Cause, DEVIATION_SIGMAS, Deviation, doubted_of_camera};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 
@@ -67,7 +67,7 @@ impl LogCalibration {
     /// Whether motions of a part of the drive may err together: nothing is suspect, or what they make so.
     fn may_drift(&self) -> bool {
         let causes = [Cause::Drift, Cause::OdometryK, Cause::WheelBase, Cause::Wheels];
-        let may = |cause: Cause| cause.errs_once_round() || causes.contains(&cause);
+        let may = |cause: Cause| cause.is_of_camera() || causes.contains(&cause);
         self.misreading.is_none() && self.estimate.suspect.is_none_or(|suspect| may(suspect.cause))
     }
 }
@@ -149,8 +149,8 @@ pub fn calibrate_log(
     })
 }
 
-/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing but the image centre or the shutter
-/// is suspect then, and the wheels are as told.
+/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing but the camera is suspect
+/// then, and the wheels are as told.
 fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) -> Option<LogCalibration> {
     let as_told = problem.clone();
     let (mut descent, doubted) = solve_with_doubt(&mut problem, options.max_iterations)?;
@@ -159,7 +159,7 @@ fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) 
     }
     descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
     let answer = report(options, &problem, &descent, None).ok()?;
-    let fits = answer.estimate.suspect.is_none_or(|suspect| suspect.cause.errs_once_round());
+    let fits = answer.estimate.suspect.is_none_or(|suspect| suspect.cause.is_of_camera());
     (answer.converged && fits).then_some(LogCalibration { doubted, ..answer })
 }
 
@@ -282,9 +282,9 @@ fn report(
     let factors = pulled.noise_factors();
     let deviations = solved_deviations(options, pulled, &by_landmarks, factors.excess());
     let suspect = pulled.suspect(o, &counts, (factors, &deviations), &by_landmarks, motions.as_ref());
-    let once_round = doubted_once_round(&deviations, factors.excess());
-    let widened_by = |by| with(landmarks.as_ref(), with(motions.as_ref(), with(by, own)));
-    let mounting = widened_by(once_round.map(|doubted| &doubted.scatter));
+    let of_camera = doubted_of_camera(&deviations, factors.excess());
+    let widened_from = |own| with(landmarks.as_ref(), with(motions.as_ref(), own));
+    let mounting = widened_from(of_camera.iter().fold(own, |own, doubted| widened(&own, &doubted.scatter)));
     let start = o.start_covariance * scale;
     let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {
@@ -301,7 +301,7 @@ fn report(
             false,
         )
         .judged(counts, suspect)
-        .doubting(once_round, || widened_by(None), &start),
+        .doubting(of_camera.first(), || widened_from(own), &start),
         wheels: problem.wheels,
         wheels_sigma: if free.wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: problem.offset_s,

@@ -2,7 +2,7 @@
 
 use super::state::{Examination, MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, ITERATIONS};
-use crate::selfcalib::diagnosis::doubted_once_round;
+use crate::selfcalib::diagnosis::doubted_of_camera;
 use crate::selfcalib::model::MotionLoss;
 
 impl SlidingWindow {
@@ -20,8 +20,8 @@ impl SlidingWindow {
         let factors = now.noise_factors();
         let deviations = now.deviations(&covariance, factors.excess());
         let suspect = now.suspect(&self.options, &counts, (factors, &deviations), &covariance, motion_scatter.as_ref());
-        let doubted_once_round = doubted_once_round(&deviations, factors.excess()).cloned();
-        self.examination = Examination { contradictions: counts, suspect, motion_scatter, doubted_once_round };
+        let doubted_of_camera = doubted_of_camera(&deviations, factors.excess());
+        self.examination = Examination { contradictions: counts, suspect, motion_scatter, doubted_of_camera };
     }
 
     /// What the last examination found.

@@ -26,9 +26,9 @@ pub(crate) struct Examination {
     pub(crate) suspect: Option<Suspect>,
     /// Covariance of the mounting that errors make which motions of a part of the drive share.
     pub(crate) motion_scatter: Option<Matrix3<f64>>,
-    /// That of the image centre or of the shutter, where one is doubted.
+    /// What is doubted of the camera: image centre, shutter, creep.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub(crate) doubted_once_round: Option<Deviation>,
+    pub(crate) doubted_of_camera: Vec<Deviation>,
 }
 
 /// An iterated extended Kalman filter on (pose, mounting, landmarks), and a sliding window of keyframes that is solved again, and
@@ -109,16 +109,16 @@ impl SlidingWindow {
             && problem.observations().all(|observation| observation.landmark < count)
     }
 
-    /// The mounting with its covariance, as [`covariance_as_told`](Self::covariance_as_told) tells and widened for an image centre or a
-    /// shutter that was doubted at the last examination.
+    /// The mounting with its covariance, as [`covariance_as_told`](Self::covariance_as_told) tells and widened for an image centre, a
+    /// shutter or a creep that was doubted at the last examination.
     pub(crate) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
         let known = self.covariance_as_told();
-        let doubted = self.examination.doubted_once_round.as_ref();
-        let covariance = doubted.map_or(known, |doubted| widened(&known, &doubted.scatter));
+        let doubted = self.examination.doubted_of_camera.iter();
+        let covariance = doubted.fold(known, |known, doubted| widened(&known, &doubted.scatter));
         (self.mean.fixed_rows::<3>(MOUNTING).into(), covariance)
     }
 
-    /// The covariance of the mounting if image centre and shutter are as told: that of the last solution, where information gained since may be
+    /// The covariance of the mounting if the camera is as told: that of the last solution, where information gained since may be
     /// spurious, and widened for errors that a landmark's bearings share, and for those that up to the last examination motions of the
     /// drive shared.
     pub(crate) fn covariance_as_told(&self) -> Matrix3<f64> {

@@ -1,0 +1,78 @@
+//! What is most likely wrong with a log is named.
+
+use tiltvp_core::filter::ConsistencyBand;
+use tiltvp_core::selfcalib::{CalibrationMethod, Cause, LogCalibration, LogOptions, Misreading};
+
+use crate::simulated::{
+    DRIVES, Drive, Errors, NONE, Turns, assert_relied_upon, band, drive, followed, mean, nees, options, whole,
+};
+
+/// From bearings about a centre that is off by one to eight pixels where posts are seen at a radius of 150.
+#[test]
+fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
+    let options = LogOptions { estimate_centre: true, ..options() };
+    let alone = ConsistencyBand::of_mean(0.9999, 1, DRIVES).unwrap();
+    for centre in [[0.0067, 0.0], [-0.012, 0.016], [0.0, -0.053]] {
+        let drives: Vec<Drive> = (0..DRIVES).map(|seed| drive(seed, Errors { centre, ..NONE })).collect();
+        for drive in &drives {
+            let told = whole(drive, &self::options());
+            // Eight pixels look like a bump as well.
+            let named = |cause| cause == Cause::Centre || (cause == Cause::Bump && centre[1] < -0.05);
+            assert!(told.estimate.suspect.is_some_and(|suspect| named(suspect.cause)), "{told}");
+            let followed = followed(drive, CalibrationMethod::Default);
+            assert!(!followed.reliable(), "{followed}");
+        }
+        let found: Vec<LogCalibration> = drives.iter().map(|drive| whole(drive, &options)).collect();
+        let square = |found: &LogCalibration, k: usize| {
+            ((found.centre_off_rad[k] - centre[k]) / found.centre_off_sigma_rad[k]).powi(2)
+        };
+        let squares = [0, 1].map(|k| mean(found.iter().map(|found| square(found, k))));
+        let nees = mean(found.iter().map(|found| nees(&found.estimate)));
+        println!(
+            "a centre off by {centre:?}: mean squared errors in stated sigmas {squares:.2?}, NEES of the mounting {nees:.2} of 3"
+        );
+        assert!(squares.iter().all(|square| alone.holds(*square)) && band().holds(nees), "{squares:?}, {nees}");
+        assert_relied_upon(&found);
+    }
+}
+
+/// The mounting that is told is the one at the end, which is neither that of most of the drive nor stated to be.
+#[test]
+fn a_camera_that_creeps_is_named() {
+    for creep_rad in [-0.05, 0.05] {
+        for seed in 0..DRIVES {
+            let log = drive(seed, Errors { creep_rad, ..NONE });
+            let found = whole(&log, &options());
+            let suspect = found.estimate.suspect.unwrap();
+            assert!(suspect.cause == Cause::Creep && (suspect.value - creep_rad).abs() < 0.02, "{found}");
+            assert!(!found.reliable() && nees(&found.estimate) < 16.0, "{found}");
+            let followed = followed(&log, CalibrationMethod::Default);
+            assert!(followed.suspect.is_some_and(|suspect| suspect.cause == Cause::Creep), "{followed}");
+        }
+    }
+}
+
+/// Early and late bearings of a robot whose turns begin at once are told by the solution that takes them to be on time.
+#[test]
+fn a_delay_that_nobody_asked_for_is_named() {
+    for late_s in [-0.15, 0.15] {
+        for seed in 0..4 {
+            let found = whole(&drive(seed, Errors { turns: Turns::Abrupt, late_s, ..NONE }), &options());
+            let suspect = found.estimate.suspect.unwrap();
+            assert!(matches!(suspect.cause, Cause::TimeOffset) && !found.reliable(), "{found}");
+            assert!(suspect.value.signum() == f64::signum(late_s), "{found}");
+        }
+    }
+}
+
+#[test]
+fn a_log_that_was_misread_and_a_camera_that_was_pushed_are_told() {
+    for seed in 0..4 {
+        let mut swapped = drive(seed, NONE);
+        swapped.readings.iter_mut().for_each(|read| std::mem::swap(&mut read.left_m, &mut read.right_m));
+        let found = whole(&swapped, &options());
+        assert!(matches!(found.misreading, Some(Misreading::Reflected)) && !found.reliable(), "{found}");
+        let pushed = followed(&drive(seed, Errors { bump_m: 0.1, ..NONE }), CalibrationMethod::Default);
+        assert!(pushed.alarm && !pushed.reliable(), "{pushed}");
+    }
+}
