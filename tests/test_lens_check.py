@@ -10,9 +10,11 @@ import pytest
 import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import read_rotation
 
 FOCAL = 139.7
 CENTRE = (319.5, 239.5)
+FORWARD = read_rotation("forward")
 
 
 def fisheye(focal: float = FOCAL, du: float = 0.0, dv: float = 0.0) -> tiltvp.Camera:
@@ -82,6 +84,30 @@ def test_a_pinhole_keeps_straight_what_is_straight_so_that_nothing_is_told() -> 
         assert found
         assert min(found.sigmas[:2]) > 10.0
         assert found.sigmas[2] > 0.1
+
+
+def pinhole(focal: float) -> tiltvp.Camera:
+    return tiltvp.Camera.pinhole(width=640, height=480, fx=focal, fy=focal, cx=319.5, cy=239.5)
+
+
+@pytest.fixture(scope="module")
+def ahead() -> list[np.ndarray]:
+    """Views ahead in a rendered room, by a pinhole of 380 pixels a radian."""
+    room, rng = tiltvp.synth.Room("office", seed=11406), np.random.default_rng(0)
+    leans = {"alpha_rad": 0.1, "camera_height_m": 1.0, "robot_from_camera": FORWARD}
+    return [
+        room.render(pinhole(380.0), pose=pose, beta_rad=float(rng.uniform(-3.0, 3.0)), **leans).gray
+        for pose in room.free_poses(12, seed=0)
+    ]
+
+
+@pytest.mark.parametrize("share", [0.9, 1.0, 1.1])
+def test_right_angles_tell_the_focal_length_of_a_pinhole(ahead: list[np.ndarray], share: float) -> None:
+    found = tiltvp.check_lens(ahead, pinhole(380.0 * share))
+    assert found.scale_by_right_angles == pytest.approx(1.0 / share, abs=4.0 * found.sigma_by_right_angles)
+    assert found.sigma_by_right_angles < 0.02
+    assert bool(found) == found.scale_believable == (share == 1.0)
+    assert ("at right angles" in found.reason) == (share != 1.0)
 
 
 def test_a_few_images_and_bare_ones_tell_nothing() -> None:

@@ -84,6 +84,6 @@ def trust(
     if asked:
         show_frame("Sets of five images of one building: which direction is up", summarise_sets(asked), ["of", "setup"])
     if lenses is not None:
-        show_frame("Sets of five images of one building: whether its lens is believed", lenses, ["setup", "told"])
+        show_frame("Sets of images of one building: whether its lens is believed", lenses, ["setup", "told"])
     if weights and asked:
         print(train_setups(asked).python())

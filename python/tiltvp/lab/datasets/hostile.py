@@ -141,6 +141,13 @@ def focal_off(rng: np.random.Generator, share: float = 0.1) -> Camera:
     return _equidistant(focal_px=focal, max_theta_rad=np.deg2rad(92.5) * 139.7 / focal)
 
 
+def pinhole_focal_off(rng: np.random.Generator, share: float = 0.1) -> Camera:
+    """The camera that looks ahead with a focal length that is off by a share, either way."""
+    parts = AHEAD.parameters
+    focal = parts["fx"] * (1.0 + share * rng.choice([-1.0, 1.0]))
+    return Camera.pinhole(width=640, height=480, fx=focal, fy=focal, cx=parts["cx"], cy=parts["cy"])
+
+
 def centre_off(rng: np.random.Generator, off_px: float = 10.0) -> Camera:
     """The upward camera with a centre that is off by so many pixels, in any direction."""
     azimuth = rng.uniform(-np.pi, np.pi)

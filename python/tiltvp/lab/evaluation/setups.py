@@ -20,6 +20,7 @@ from tiltvp.lab.datasets.hostile import (
     WHOLE,
     centre_off,
     focal_off,
+    pinhole_focal_off,
 )
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
 from tiltvp.lab.evaluation.choices import Network, train_network
@@ -38,6 +39,8 @@ __all__ = ["IMAGES", "ImageSet", "image_sets", "judge_lenses", "summarise_sets",
 
 IMAGES: Final = 5
 """Images of a set."""
+MANY: Final = 20
+"""Of one that right angles tell more often."""
 UNITS: Final = 17
 DECAY: Final = 0.02
 """Hidden units and decay of the network: with half of that decay sets are surer and more often wrong, by one in a
@@ -93,11 +96,16 @@ def image_sets(
 
 
 def _views(
-    own: Sequence[Panorama], camera: Camera, mounting: NDArray[np.float64], rng: np.random.Generator, seed: int
+    own: Sequence[Panorama],
+    camera: Camera,
+    mounting: NDArray[np.float64],
+    rng: np.random.Generator,
+    seed: int,
+    count: int = IMAGES,
 ) -> list[NDArray[np.uint8]]:
     """A set of images from panoramas of one building."""
     images = []
-    for k in range(IMAGES):
+    for k in range(count):
         panorama = own[int(rng.integers(len(own)))]
         views = PanoramaViews(panorama, camera, robot_from_camera=mounting)
         lean = normal_from_alpha_beta(np.deg2rad(rng.uniform(0.0, LEAN_MAX_DEG)), rng.uniform(-np.pi, np.pi))
@@ -108,38 +116,41 @@ def _views(
 def judge_lenses(
     panoramas: Sequence[Panorama], *, seed: int = 0, advance: Callable[[], None] = lambda: None
 ) -> pl.DataFrame:
-    """One row for each lens that sets of the fisheye, one of each building and setup, are told to be of: sets, and in
+    """One row for each lens that sets of a camera, one of each building and setup, are told to be of: sets, and in
     per cent of them those that believe it; medians of the errors of what is found, in pixels of the centre and per cent
-    of the focal length.
+    of the focal length, which right angles tell of the pinhole.
     """
     rows = []
     for number, location in enumerate(sorted({panorama.location for panorama in panoramas})):
         own = [panorama for panorama in panoramas if panorama.location == location]
         rng = np.random.default_rng((seed, number, 1))
-        for setup in ("upward", "fisheye ahead"):
-            images = _views(own, *SETUPS[setup], rng, seed)
-            lenses = {
-                "as it is": UPWARD,
-                "centre off by 10 px": centre_off(rng),
-                "focal length off by 10 %": focal_off(rng),
-            }
+        for setup, count in (("upward", IMAGES), ("fisheye ahead", IMAGES), ("ahead", IMAGES), ("ahead", MANY)):
+            images, (true, _) = _views(own, *SETUPS[setup], rng, seed, count), SETUPS[setup]
+            lenses = {"as it is": true}
+            if setup == "ahead":
+                lenses["focal length off by 10 %"] = pinhole_focal_off(rng)
+            else:
+                lenses["centre off by 10 px"] = centre_off(rng)
+                lenses["focal length off by 10 %"] = focal_off(rng)
             for lens, camera in lenses.items():
                 found = check_lens(images, camera)
-                was, is_ = camera.parameters, UPWARD.parameters
+                was, is_ = camera.parameters, true.parameters
                 off = np.array([is_["cx"] - was["cx"], is_["cy"] - was["cy"]]) - found.centre_off_px
+                focal, scale = ("focal_px", found.scale) if setup != "ahead" else ("fx", found.scale_by_right_angles)
                 rows.append(
                     {
                         "setup": setup,
+                        "images": count,
                         "told": lens,
                         "believed": bool(found),
-                        "centre_px": float(np.hypot(*off)),
-                        "scale_percent": 100.0 * abs(found.scale - is_["focal_px"] / was["focal_px"]),
+                        "centre_px": float(np.hypot(*off)) if setup != "ahead" else None,
+                        "scale_percent": 100.0 * abs(scale - is_[focal] / was[focal]),
                     }
                 )
         advance()
     return (
         pl.DataFrame(rows)
-        .group_by("setup", "told", maintain_order=True)
+        .group_by("setup", "images", "told", maintain_order=True)
         .agg(
             pl.len().alias("sets"),
             (100.0 * pl.col("believed").mean()).alias("believed"),
