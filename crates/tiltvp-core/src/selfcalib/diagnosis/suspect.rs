@@ -180,13 +180,18 @@ impl BundleProblem {
             .iter()
             .filter(|d| d.sigmas > most(d) * excess.sqrt() && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
             .max_by(|a, b| a.sigmas.total_cmp(&b.sigmas));
+        let drift = motion_scatter.map_or(1.0, |scatter| largest_ratio(covariance, scatter));
+        // The odometry alone tells a creep: motions that are noisier, or err together, turn the robot against the bearings as well.
+        let is_outdone = |d: &&Deviation| d.of == Assumed::Creep && d.sigmas <= drift * excess.sqrt();
+        let creep = worst.filter(is_outdone);
+        let worst = worst.filter(|d| !is_outdone(d));
         if let Some(d) = worst {
             return match d.of {
                 Assumed::Imbalance => found(Cause::Wheels, (2.0 * (self.wheels.imbalance + d.value)).exp()),
                 // Readings are linear in the base; below zero where they turn to the other side.
                 Assumed::WheelBase => found(Cause::WheelBase, self.wheels.base_m * (1.0 + d.value).abs()),
                 Assumed::TimeOffset => found(Cause::TimeOffset, d.value),
-                // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre, and turns it.
+                // A bump moves the camera's place, which the bearings of a part of the drive tell as another centre.
                 Assumed::Centre | Assumed::Shutter | Assumed::Creep => bump().or_else(|| d.of_camera()),
             };
         }
@@ -205,9 +210,7 @@ impl BundleProblem {
         if contradicted > MOST_CONTRADICTED {
             return found(Cause::Slips, contradicted);
         }
-        bump().or_else(|| {
-            let drift = largest_ratio(covariance, motion_scatter?);
-            (drift > MOST_DRIFT).then_some(Suspect { cause: Cause::Drift, value: drift })
-        })
+        let of_part = (drift > MOST_DRIFT).then_some(Suspect { cause: Cause::Drift, value: drift });
+        bump().or(of_part).or_else(|| creep?.of_camera())
     }
 }
