@@ -147,7 +147,7 @@ def check_lens(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike |
     edges.
 
     Where that leaves the focal length open, as of a pinhole, right angles are asked (Caprile and Torre 1990): most
-    edges of buildings run along three axes. Twenty images tell twice as often as five.
+    edges of buildings run along three axes. Twenty images tell more often than five.
 
     Raises `InvalidInputError` for no images, for images and masks of another size than the camera's, and for masks of
     another type than bool.

@@ -1,4 +1,5 @@
-//! How far the wheels, the clock, the image centre, the shutter and a camera that keeps its direction are from what is assumed, by the score of the solution with each of them free.
+//! How far the wheels, the clock, the image centre, the shutter and the direction of the camera along the drive are from what is assumed, by
+//! the score of the solution with each of them free.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -22,8 +23,8 @@ pub(crate) enum Assumed {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Deviation {
     pub(crate) of: Assumed,
-    /// How far it is off: of the wheel base in units of that, of the centre the distance, of the shutter seconds from the middle to the lines, of the creep the turn
-    /// from the first keyframe to the last.
+    /// How far it is off: of the wheel base in units of that, of the centre the distance, of the shutter seconds from the middle to the lines,
+    /// of the creep the turn from the first keyframe to the last.
     pub(crate) value: f64,
     /// The same in standard deviations.
     pub(crate) sigmas: f64,

@@ -82,7 +82,8 @@ pub struct Suspect {
     pub cause: Cause,
     /// The number that would suit, times in steps, or in seconds in a log with times; of `turns`, `outliers` and `slips` the share that is
     /// contradicted, of `bump` the angle in radians, of `centre` the largest error of a bearing in radians, of `rolling_shutter` by how much
-    /// later lines are seen on one side, of `creep` the angle in radians from the first keyframe to the last, of `drift` the factor of a standard deviation.
+    /// later lines are seen on one side, of `creep` the angle in radians from the first keyframe to the last, of `drift` the factor of a
+    /// standard deviation.
     pub value: f64,
 }
 
