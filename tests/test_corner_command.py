@@ -19,6 +19,7 @@ from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.robot import Robot
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import open_frames
+from tiltvp.synth import Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
 
@@ -104,6 +105,29 @@ def test_the_mounting_of_a_robot_says_which_way_is_down(run: Run, tmp_path: Path
     assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
     # What is given counts all the same.
     assert "another --pitch or --down" in run(*words, "--pitch", 80).out
+
+
+def test_a_calibration_that_straight_edges_speak_against_is_told(run: Run, tmp_path: Path) -> None:
+    """Nothing told of one camera that its focal length is off."""
+    left, right = zed_cameras()
+    sequence = StereoSequence(Room("office", 3), left=left, right=right, frames=5, seed=3)
+    for frame in range(5):
+        for side, image in zip(("left", "right"), sequence.render(frame), strict=True):
+            tiltvp.write_image(tmp_path / side / f"{frame}.png", image)
+    narrow = {name: 0.9 * left.parameters[name] for name in ("fx", "fy")}
+    off = tiltvp.Camera("pinhole", width=left.width, height=left.height, **{**left.parameters, **narrow})
+    for name, lenses in (("told", (left, right)), ("off", (off, right))):
+        StereoRig(*lenses, sequence.left_from_right).save(tmp_path / f"{name}.toml")
+        lenses[0].save(tmp_path / f"one-{name}.toml")
+    words = ("corner", tmp_path / "left")
+    assert "bent" not in run(*words, "--calibration", tmp_path / "one-told.toml").err
+    said = run(*words, "--calibration", tmp_path / "one-off.toml").err
+    assert re.search(r"--calibration: \d+ straight edges are bent, .*: its focal length 1\.1\d\d", said)
+    words += (tmp_path / "right", "--calibration")
+    assert "bent" not in run(*words, tmp_path / "told.toml").err
+    said = run(*words, tmp_path / "off.toml").err
+    assert "--calibration, left camera: " in said
+    assert "right camera" not in said
 
 
 def test_a_trajectory_without_any_place_says_why_and_what_to_try(

@@ -129,7 +129,7 @@ def test_sides_are_found_as_well_as_they_say(name: str, centre: int, sigma: floa
     assert np.mean(squares) < 2.0
     assert max(squares) < 13.8
     assert np.sqrt(np.mean(np.square(aside_px))) < (0.03 if sigma < 5.0 else 0.15)
-    assert np.median(ends_px) < 3.0
+    assert np.median(ends_px) < 1.5
 
 
 @pytest.mark.slow

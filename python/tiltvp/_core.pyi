@@ -2575,8 +2575,8 @@ class Segments:
 
     @property
     def ends(self) -> NDArray[np.float64]:
-        """(N, 2, 3) float64: unit bearings of the ends; from the first to the second is a positive turn about the
-        normal.
+        """(N, 2, 3) float64: unit bearings of the ends, a pixel beyond the outermost pixels that show the edge, because
+        gradients there see what is behind it; from the first to the second is a positive turn about the normal.
         """
 
     @classmethod

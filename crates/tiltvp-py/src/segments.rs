@@ -91,7 +91,8 @@ value! {
     Segments as own {
         /// (N, 3) float64: unit normals of the great circles, towards the brighter side.
         normal: Vec<Vector3<f64>>,
-        /// (N, 2, 3) float64: unit bearings of the ends; from the first to the second is a positive turn about the normal.
+        /// (N, 2, 3) float64: unit bearings of the ends, a pixel beyond the outermost pixels that show the edge, because gradients
+        /// there see what is behind it; from the first to the second is a positive turn about the normal.
         ends: Vec<Matrix2x3<f64>>,
         /// (N, 3) float64: unit bearings of the middles of the pixels.
         middle: Vec<Vector3<f64>>,
@@ -130,15 +131,18 @@ value! {
 
 impl From<&core::Segments> for Segments {
     fn from(found: &core::Segments) -> Self {
-        let own = || found.list.iter();
+        // Of two pixels more the order may be another one, for pixels are not as wide everywhere.
+        let mut list: Vec<_> = found.list.iter().collect();
+        list.sort_by(|a, b| b.edge_length_rad().total_cmp(&a.edge_length_rad()));
+        let own = || list.iter().copied();
         let row = |ends: &[Vector3<f64>; 2]| Matrix2x3::from_rows(&ends.map(|end| end.transpose()));
         let place = |pixel: [f32; 2]| Vector2::from(pixel.map(f64::from));
         let points = own().flat_map(|segment| found.points_of(segment));
         Self {
             normal: own().map(|segment| segment.normal).collect(),
-            ends: own().map(|segment| row(&segment.ends)).collect(),
+            ends: own().map(|segment| row(&segment.edge_ends())).collect(),
             middle: own().map(|segment| segment.middle).collect(),
-            length_rad: own().map(|segment| segment.length_rad).collect(),
+            length_rad: own().map(Segment::edge_length_rad).collect(),
             variances_rad2: own().map(|segment| segment.variances_rad2.into()).collect(),
             contrast: own().map(|segment| segment.contrast).collect(),
             rms_px: own().map(|segment| segment.rms_px).collect(),

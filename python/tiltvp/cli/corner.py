@@ -17,6 +17,7 @@ from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library
+from tiltvp.cli.frame_checks import tell_lens_of
 from tiltvp.cli.options import FrameRate, Switch, image_size_from
 from tiltvp.cli.repeats import Repeats
 from tiltvp.cli.rerun_views import send_corner
@@ -150,6 +151,10 @@ def corner(
     for side in (frames, others):
         check_apart(side, *results.files.values(), beside=(inertial.imu, options.mask, calibration))
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
+    mask = known.get("mask", None if robot is None else robot.mask)
+    sides = [(frames, "")] if others is None else [(frames, ", left camera"), (others, ", right camera")]
+    for camera, (side, which) in zip(cameras, sides, strict=True):
+        tell_lens_of(side, camera, mask, f"--calibration{which}")
     with watching.viewer() as viewer:
         look = Look(cameras[0], estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, partners, frame_rate))

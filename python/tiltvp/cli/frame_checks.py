@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Mounted = TiltEstimator | LineExtractor
 
-__all__ = ["check_panoramas", "check_sizes", "tell_setup", "tell_setup_of", "tell_unusable"]
+__all__ = ["check_panoramas", "check_sizes", "tell_lens_of", "tell_setup", "tell_setup_of", "tell_unusable"]
 
 
 def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
@@ -77,18 +77,31 @@ def tell_setup(images: Sequence[NDArray[Any]], estimator: Mounted, mask: NDArray
 def tell_setup_of(frames: Frames, finder: Mounted | SegmentDetector) -> None:
     """`tell_setup` of a few frames, spread over a source that can be read again; of the calibration alone where edges
     are looked for whichever way the camera is mounted."""
-    from tiltvp import check_lens
-    from tiltvp.robot_setup import LEAST, spread
     from tiltvp.segments import SegmentDetector
 
     mask = finder.options["mask"]
-    images = [image for _, image in spread(frames, finder.camera, LEAST)]
-    if len(images) < LEAST:
-        return
-    if not isinstance(finder, SegmentDetector):
+    if isinstance(finder, SegmentDetector):
+        tell_lens_of(frames, finder.camera, mask, "--camera")
+    elif images := _few(frames, finder.camera):
         tell_setup(images, finder, mask)
-    elif not (found := check_lens(images, finder.camera, mask=mask)):
-        complain(f"--camera: {found.reason}")
+
+
+def tell_lens_of(frames: Frames, camera: _core.Camera, mask: NDArray[Any] | None, option: str) -> None:
+    """A line on stderr where a few frames, spread over a source that can be read again, speak against the calibration
+    of an option."""
+    from tiltvp import check_lens
+
+    images = _few(frames, camera)
+    if images and not (found := check_lens(images, camera, mask=mask)):
+        complain(f"{option}: {found.reason}")
+
+
+def _few(frames: Frames, camera: _core.Camera) -> list[NDArray[Any]]:
+    """Images spread over a source that can be read again; none where there are too few to tell anything."""
+    from tiltvp.robot_setup import LEAST, spread
+
+    images = [image for _, image in spread(frames, camera, LEAST)]
+    return images if len(images) >= LEAST else []
 
 
 def _sizes(frames: Frames) -> Iterator[tuple[str, tuple[int, int] | TiltvpError | None]]:

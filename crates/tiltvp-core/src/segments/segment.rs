@@ -1,8 +1,13 @@
 //! What the detector finds.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
+
+/// How far in pixels an edge goes on beyond the outermost pixels that show it: the kernel of a gradient takes in one to each side,
+/// and nearer to an end than that it takes in what is behind, too.
+const REACH_PX: f64 = 1.0;
 
 /// A pixel of an edge: where the edge passes, between pixel centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,9 +31,9 @@ pub struct Segment {
     pub normal: Vector3<f64>,
     /// Unit bearing of the middle of the pixels, on the circle.
     pub middle: Vector3<f64>,
-    /// Unit bearings of the ends, on the circle: from the first to the second is a positive turn about the normal.
+    /// Unit bearings of the outermost pixels, on the circle: from the first to the second is a positive turn about the normal.
     pub ends: [Vector3<f64>; 2],
-    /// Angle between the ends in radians.
+    /// Angle between these in radians.
     pub length_rad: f64,
     /// Variances in squared radians of the normal's turn about [`along`](Self::along), which moves the arc sideways, and about
     /// `middle`, which turns it.
@@ -47,6 +52,22 @@ impl Segment {
     /// The unit direction along the arc at its middle: `normal` x `middle`.
     pub fn along(&self) -> Vector3<f64> {
         self.normal.cross(&self.middle)
+    }
+
+    /// Unit bearings of where the edge itself ends, a pixel beyond its outermost ones; an arc of less than half a turn as before.
+    pub fn edge_ends(&self) -> [Vector3<f64>; 2] {
+        let (sin, cos) = self.reach_rad().sin_cos();
+        let [first, last] = self.ends;
+        [first * cos - self.normal.cross(&first) * sin, last * cos + self.normal.cross(&last) * sin]
+    }
+
+    /// Angle between these in radians.
+    pub fn edge_length_rad(&self) -> f64 {
+        self.length_rad + 2.0 * self.reach_rad()
+    }
+
+    fn reach_rad(&self) -> f64 {
+        (REACH_PX / self.px_per_rad).min(0.25 * (PI - self.length_rad))
     }
 
     /// Length in pixels, at the image's scale across the edge.

@@ -101,7 +101,7 @@ impl CornerDetector {
         self.with_scratch(py, |scratch| {
             inner.detect_general(&view, None, scratch, &mut found)?;
             let pixels = inner.segments(scratch).iter().filter_map(|segment| {
-                let [a, b] = segment.ends.map(|end| inner.camera().project(&end));
+                let [a, b] = segment.edge_ends().map(|end| inner.camera().project(&end));
                 a.zip(b).map(|(a, b)| [a.x, a.y, b.x, b.y])
             });
             rows = pixels.collect();
