@@ -151,10 +151,7 @@ def corner(
     for side in (frames, others):
         check_apart(side, *results.files.values(), beside=(inertial.imu, options.mask, calibration))
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
-    mask = known.get("mask", None if robot is None else robot.mask)
-    sides = [(frames, "")] if others is None else [(frames, ", left camera"), (others, ", right camera")]
-    for camera, (side, which) in zip(cameras, sides, strict=True):
-        tell_lens_of(side, camera, mask, f"--calibration{which}")
+    _tell_lenses(cameras, frames, others, known.get("mask", None if robot is None else robot.mask))
     with watching.viewer() as viewer:
         look = Look(cameras[0], estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, partners, frame_rate))
@@ -250,6 +247,13 @@ def _robot_of(calibration: Path, known: dict[str, Any]) -> tuple[Robot | None, d
         return None, known
     robot = Robot.load(calibration)
     return robot, {"down": tuple(-robot.robot_from_camera[2])} | known
+
+
+def _tell_lenses(cameras: Sequence[Camera], left: Frames, right: Frames | None, mask: NDArray[np.bool_] | None) -> None:
+    """A line on stderr for each camera whose images speak against its calibration."""
+    sides = [(left, "")] if right is None else [(left, ", left camera"), (right, ", right camera")]
+    for camera, (frames, which) in zip(cameras, sides, strict=True):
+        tell_lens_of(frames, camera, mask, f"--calibration{which}")
 
 
 def _blamed(names: Sequence[str], problem: str) -> str:
