@@ -104,9 +104,8 @@ def corner(
     One camera tells its position too where its height above the corner (--camera-height-m), the length of an edge
     (--edge-length-m) or the size of the box (--box-size-m) is known.
 
-    The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped,
-    and the exit code is 1; images without a corner have rows without a pose that say why. Where no image has a pose, a
-    line says what to try.
+    The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped (exit
+    code 1); images without a corner have rows that say why. Where no image has a pose, a line says what to try.
 
     Parameters
     ----------
