@@ -60,7 +60,6 @@ LSD_SHIFT_PX = 0.08
 STEP = 4.0
 """Least step of grey levels, twice the noise, that is a reason to find an edge."""
 
-
 CHI2_MEDIAN = 0.455
 """Median of the squares of normal errors over their variances."""
 

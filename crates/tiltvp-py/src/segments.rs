@@ -131,7 +131,7 @@ value! {
 
 impl From<&core::Segments> for Segments {
     fn from(found: &core::Segments) -> Self {
-        // Of two pixels more the order may be another one, for pixels are not as wide everywhere.
+        // The same pixel is a larger angle in one place than in another, so that the order may be another one.
         let mut list: Vec<_> = found.list.iter().collect();
         list.sort_by(|a, b| b.edge_length_rad().total_cmp(&a.edge_length_rad()));
         let own = || list.iter().copied();

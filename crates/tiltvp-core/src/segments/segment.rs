@@ -55,6 +55,7 @@ impl Segment {
     }
 
     /// Unit bearings of where the edge itself ends, a pixel beyond its outermost ones; an arc of less than half a turn as before.
+    /// What sets edges beside each other goes by `ends`, which its limits in pixels are made for.
     pub fn edge_ends(&self) -> [Vector3<f64>; 2] {
         let (sin, cos) = self.reach_rad().sin_cos();
         let [first, last] = self.ends;
