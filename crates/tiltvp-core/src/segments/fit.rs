@@ -17,8 +17,13 @@ const POINT_SIGMA_PX: f64 = 0.25;
 /// Points in a row whose errors are one: those that a kernel of smoothing and gradient sees together.
 const CORRELATED: f64 = 3.0;
 
-/// Standard deviation in pixels of what moves a whole edge: lenses, shading.
-const EDGE_SIGMA_PX: f64 = 0.08;
+/// Standard deviation in pixels of what moves a whole edge sideways: what is beside it, tone curves, lenses. Of edges of rendered
+/// rooms 84 to 93 % are within the regions of 90 % then.
+const MOVED_SIGMA_PX: f64 = 0.25;
+
+/// Standard deviation in pixels of what moves its ends apart. Of the same edges 92 to 95 % are within the regions of 90 %; uprights of
+/// panoramas turn by more, by 0.4 pixels over their length.
+const TURNED_SIGMA_PX: f64 = 0.28;
 
 /// Units of the Scharr kernel in a gradient of one grey level per pixel.
 pub(super) const SCHARR: f64 = 32.0;
@@ -127,10 +132,10 @@ vectorised! {
         if length_rad.is_nan() || length_rad * px_per_rad < 1.0 {
             return None;
         }
-        let point = (rms_px.max(POINT_SIGMA_PX) / px_per_rad).powi(2) * CORRELATED / inliers as f64;
-        let offset = point + (EDGE_SIGMA_PX / px_per_rad).powi(2);
-        // The variance of the slope of points spread evenly over a length.
-        let slope = 12.0 * offset / (length_rad * length_rad);
+        let point_px2 = rms_px.max(POINT_SIGMA_PX).powi(2) * CORRELATED / inliers as f64;
+        let offset = (point_px2 + MOVED_SIGMA_PX.powi(2)) / px_per_rad.powi(2);
+        // The variance of the slope of points spread evenly over a length is twelve times that of their mean.
+        let slope = (12.0 * point_px2 + TURNED_SIGMA_PX.powi(2)) / (px_per_rad * length_rad).powi(2);
         Some(Segment {
             normal,
             middle,
