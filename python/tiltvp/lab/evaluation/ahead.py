@@ -11,6 +11,8 @@ import polars as pl
 
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, AheadView, ahead_views, roll_pitch
 from tiltvp.lab.evaluation.choices import Network, choice_shares, train_network
+from tiltvp.lab.evaluation.curves import region_limit
+from tiltvp.lab.evaluation.metrics import offset_rad
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import TiltEstimator
 
@@ -36,6 +38,8 @@ EXPECTED: Final = (1, 2, 3)
 RIGHT_DEG: Final = 5.0
 """A view trains if one of its hypotheses is as near as this."""
 FOLDS: Final = 5
+REGIONS: Final = (0.5, 0.9, 0.95, 0.999)
+"""Nominal probabilities of the covariance's regions in which truths are counted."""
 NONE_ODDS: Final = 0.08
 """Odds, against the best hypothesis, that none is right, as the software has them."""
 
@@ -93,7 +97,8 @@ def prior_table(
     """What "segments" makes of views that are known to lean by at most so many degrees, by the kind of camera.
 
     In per cent of all views: right (off by at most two degrees), answered, sure (a confidence of at least 0.9), sure
-    and wrong; the median error of the answers.
+    and wrong; the median error of the answers; in per cent of these, truths inside the 50, 90, 95 and 99.9 % regions of
+    the covariance.
     """
     # Roll and pitch of the corner of a square lean by the square's half diagonal.
     lean_max_deg = prior_deg / float(np.sqrt(2.0))
@@ -139,16 +144,19 @@ def _estimators(tilt_max_rad: float) -> dict[str, TiltEstimator]:
 
 def _told(estimator: TiltEstimator, view: AheadView) -> dict[str, Any]:
     """What an estimator makes of a view."""
-    estimate, error = estimator(view.image), None
+    estimate, error, squared = estimator(view.image), None, None
     if estimate:
-        cosine = np.clip(np.asarray(estimate.normal) @ estimator.robot_from_camera @ view.up, -1.0, 1.0)
-        error = float(np.rad2deg(np.arccos(cosine)))
-    return {"camera": view.camera.split()[0], "error": error, "sure": estimate.confidence >= 0.9}
+        off = offset_rad(estimate.normal, estimator.robot_from_camera @ view.up)
+        error = float(np.rad2deg(np.linalg.norm(off)))
+        squared = float(off @ np.linalg.solve(estimate.covariance_rad2, off))
+    camera = view.camera.split()[0]
+    return {"camera": camera, "error": error, "squared": squared, "sure": estimate.confidence >= 0.9}
 
 
 def _shares(rows: Sequence[dict[str, Any]], *by: str, **more: pl.Expr) -> pl.DataFrame:
     """Shares of views in per cent, by the kind of camera and other columns."""
-    error = pl.col("error")
+    error, squared = pl.col("error"), pl.col("squared")
+
     shares = {
         "right": error.fill_null(180.0) <= 2.0,
         "answered": error.is_not_null(),
@@ -156,12 +164,13 @@ def _shares(rows: Sequence[dict[str, Any]], *by: str, **more: pl.Expr) -> pl.Dat
         "sure_wrong": pl.col("sure") & (error.fill_null(0.0) > 2.0),
     } | more
     return (
-        pl.DataFrame(rows, schema_overrides={"error": pl.Float64})
+        pl.DataFrame(rows, schema_overrides={"error": pl.Float64, "squared": pl.Float64})
         .group_by("camera", *by, maintain_order=True)
         .agg(
             pl.len().alias("views"),
             *((100.0 * share.mean()).alias(name) for name, share in shares.items()),
             error.median().alias("median"),
+            *((100.0 * (squared <= region_limit(p)).mean()).alias(f"inside_{100.0 * p:g}") for p in REGIONS),
         )
     )
 

@@ -10,11 +10,11 @@ import polars as pl
 from tiltvp.lab.evaluation.combinations import PAPER_METHODS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "FAILURE_RAD", "alarm_areas", "alarm_curves", "angles_by_tilt", "errors_by_environment", "errors_by_tilt",
-    "overall_errors", "region_shares", "rejection_curves",
+    "overall_errors", "region_limit", "region_shares", "rejection_curves",
 ]  # fmt: skip
 
 FAILURE_RAD: Final = float(np.deg2rad(2.0))
@@ -87,9 +87,14 @@ def region_shares(rows: pl.DataFrame, levels: NDArray[np.float64] | None = None)
         known = part.drop_nulls(["error_rad", "covariance_xx_rad2"])
         if known.is_empty():
             continue
-        inside = _squared_distances(known)[None, :] <= -2.0 * np.log1p(-grid)[:, None]
+        inside = _squared_distances(known)[None, :] <= region_limit(grid)[:, None]
         parts.append(pl.DataFrame({"variant": part["variant"][0], "level": grid, "share": inside.mean(axis=1)}))
     return pl.concat(parts) if parts else pl.DataFrame(schema=dict.fromkeys(("variant", "level", "share"), pl.Float64))
+
+
+def region_limit(level: ArrayLike) -> NDArray[np.float64]:
+    """The squared Mahalanobis length of two numbers that is not exceeded with that probability; of any shape."""
+    return np.asarray(-2.0 * np.log1p(-np.asarray(level, dtype=np.float64)))
 
 
 def _squared_distances(rows: pl.DataFrame) -> NDArray[np.float64]:

@@ -1,10 +1,11 @@
 //! Frames of a vertical and two nearly orthogonal horizontals, and the edges that agree with them.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix2, Matrix3, Matrix4, Rotation3, SMatrix, Vector3, Vector4};
 
 use super::options::FLOOR_RAD;
+use super::sectors::Sectors;
 use crate::geometry::tangent_basis;
 use crate::segments::Segment;
 use crate::tilt::confidence::inverse_of_positive;
@@ -25,8 +26,8 @@ const SKEW_RAD: f64 = 1f64.to_radians();
 const STIFFNESS: f64 = 1.0 / (SKEW_RAD * SKEW_RAD);
 
 /// By how much variances exceed what the residuals of one image tell: set so that nine in ten truths are inside the regions of 90 % in
-/// upward views of panoramas, on every second building. They are too narrow for views ahead, and too wide for rendered rooms.
-const GROWTH: f64 = 3.0;
+/// upward views of panoramas. In views ahead 83 to 87 % are, in rendered rooms all.
+const GROWTH: f64 = 2.0;
 
 /// Bins of azimuth, over the quarter turn after which two orthogonal horizontals are as before.
 const BINS: usize = 45;
@@ -43,9 +44,6 @@ const NEGLIGIBLE: f64 = 1e-3;
 
 /// Squared distance in variances beyond which odds are nought: they are less than that.
 const FARTHEST: f64 = 25.0;
-
-/// Sectors of azimuth whose residuals are taken as one for the covariance: of 15 degrees.
-const SECTORS: usize = 24;
 
 /// A segment in the robot frame.
 #[derive(Debug, Clone, Copy)]
@@ -246,25 +244,17 @@ impl Frame {
     /// That of least squares whose errors those of one sector of azimuth share, with the pull of one edge that is of none of the axes;
     /// see `confidence::clustered_covariance`.
     pub(super) fn covariance(&self, edges: &[Edge], up: &Vector3<f64>) -> Option<Matrix2<f64>> {
-        let mut sectors = [(Matrix4::zeros(), Vector4::zeros()); SECTORS];
-        let mut curvature = prior();
+        let (mut sectors, mut curvature) = (Sectors::new(), prior());
         self.for_each(edges, |row| {
             let azimuth = row.middle.dot(&self.axes[1]).atan2(row.middle.dot(&self.axes[0]));
-            let sector = ((azimuth / (2.0 * PI) + 0.5) * SECTORS as f64) as usize;
             let outer = row.slope * row.slope.transpose();
-            let (information, score) = &mut sectors[sector.min(SECTORS - 1)];
-            *information += outer * row.weight;
-            *score += row.slope * (row.weight * row.distance);
+            sectors.add(azimuth, &(outer * row.weight), &(row.slope * (row.weight * row.distance)));
             curvature += outer * row.curvature;
         });
         let inverse = curvature.cholesky()?.inverse();
-        let held = || sectors.iter().filter(|(information, _)| information.trace() > 0.0);
-        let total: f64 = held().map(|(information, _)| information.trace()).sum();
-        let pooled = held().map(|(information, score)| score.norm_squared() / information.trace()).sum::<f64>();
-        let squares = held().map(|(information, _)| information * information).sum::<Matrix4<f64>>();
         let clutter = self.scatters[2].powi(-2);
         let spread =
-            squares * (pooled / total) + Matrix4::from_diagonal(&Vector4::new(clutter, clutter, clutter, STIFFNESS));
+            sectors.spread(&inverse) + Matrix4::from_diagonal(&Vector4::new(clutter, clutter, clutter, STIFFNESS));
         let turns: Matrix3<f64> = (inverse * spread * inverse).fixed_view::<3, 3>(0, 0).into();
         let moves: SMatrix<f64, 2, 3> = -tangent_basis(up).transpose() * up.cross_matrix();
         let covariance = moves * turns * moves.transpose() * GROWTH;

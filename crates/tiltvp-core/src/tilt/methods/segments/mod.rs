@@ -11,6 +11,7 @@ mod grid;
 mod hypothesis;
 mod near;
 mod options;
+mod sectors;
 mod vote;
 pub(in crate::tilt) mod work;
 
