@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -14,7 +15,8 @@ import tiltvp
 from tiltvp import METHODS, TiltEstimator
 from tiltvp.cli import main
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
-from tiltvp.lab.datasets.hostile import AHEAD, CASES, FORWARD, UNHARMED, hostile_images
+from tiltvp.lab.datasets.degrading import turned, unfocused
+from tiltvp.lab.datasets.hostile import AHEAD, CASES, FORWARD, UNHARMED, UPWARD, hostile_images
 from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
 from tiltvp.lab.evaluation.hostile import SURE, judge_images, summarise_cases
 from tiltvp.rotations import read_rotation
@@ -113,6 +115,19 @@ def test_a_room_drawn_without_noise_keeps_its_answer() -> None:
     assert estimate.alpha_rad < np.radians(0.1)
     assert estimate.confidence <= 0.5
     assert "steps of the pixel grid" in estimate.reason
+
+
+def test_a_room_out_of_focus_or_turned_while_exposed_is_not_believed() -> None:
+    """Nor by its edge pixels, which are told of it."""
+    rng, estimator = np.random.default_rng(1), TiltEstimator(UPWARD, method="refined")
+    image = render_room(UPWARD, kind="office", seed=1, alpha_rad=0.05, samples=2).gray
+    assert estimator(image).confidence > 0.9
+    harmed = [unfocused(image, rng), turned(image, rng)]
+    estimates = [estimator(image) for image in harmed]
+    assert all(estimate.confidence < 0.5 for estimate in estimates)
+    assert "the image is blurred" in estimates[0].reason
+    kept = [pickle.loads(pickle.dumps(estimator.detect(image))) for image in harmed]
+    assert [estimator.estimate_edges(edges) for edges in kept] == estimates
 
 
 def test_the_table_counts_who_was_wrong_and_sure() -> None:

@@ -138,6 +138,11 @@ pub(super) fn with_lean_error(covariance: Matrix2<f64>, tilt: &Tilt, share: f64)
     covariance + error * error.transpose()
 }
 
+/// Adds the error of a blurred image, of which the edges run into each other, by its standard deviation a side.
+pub(super) fn with_blur(covariance: Matrix2<f64>, sigma_rad: f64) -> Matrix2<f64> {
+    covariance + Matrix2::identity() * (sigma_rad * sigma_rad)
+}
+
 /// Adds the floor of what no image tells.
 pub(super) fn with_floor(covariance: Matrix2<f64>) -> Matrix2<f64> {
     0.5 * (covariance + covariance.transpose()) + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)

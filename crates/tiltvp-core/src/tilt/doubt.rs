@@ -27,6 +27,11 @@ pub enum Doubt {
         /// Share of the edge pixels that agree, in `[0, 1]`.
         share: f64,
     },
+    /// The steps of the image are wide.
+    Blurred {
+        /// Standard deviation of the estimate that this makes, in radians, a side.
+        sigma_rad: f64,
+    },
     /// There are few edges.
     FewEdges {
         /// Edge pixels.
@@ -76,6 +81,12 @@ impl fmt::Display for Doubt {
                 "{:.0} % of the edge pixels that agree are steps of the pixel grid, as of blocks, borders and enlarged pixels: mask them, \
                  or compress less",
                 100.0 * share
+            ),
+            Self::Blurred { sigma_rad } => write!(
+                f,
+                "the image is blurred, by which the tilt may be off by {:.1} degrees and more: focus, expose for less long, or take \
+                 the method segments",
+                sigma_rad.to_degrees()
             ),
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")

@@ -41,6 +41,7 @@ pub struct TiltEstimator {
 struct Told<'a> {
     off_px: Option<Vector2<f64>>,
     lights: &'a [f64; LIGHTS],
+    blur_rad: f64,
     steps: Steps<'a>,
 }
 
@@ -165,7 +166,8 @@ impl TiltEstimator {
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
                 let of_up = method.trust().and_then(|trust| trust.up.as_ref());
                 let lights = of_up.map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
-                let told = Told { off_px, lights: &lights, steps: Steps::Of(image) };
+                let blur_rad = self.pixels.sharpness.error_rad(image);
+                let told = Told { off_px, lights: &lights, blur_rad, steps: Steps::Of(image) };
                 Ok(self.fit(&**method, edges, &told, work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
@@ -186,7 +188,8 @@ impl TiltEstimator {
         ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())?
             .with_centre_off_px(self.centre_off_px(image))?
             .with_steps(&Steps::Of(image).all(edges, &self.pixels.region))?
-            .with_lights(&self.pixels.lightness.of(image))
+            .with_lights(&self.pixels.lightness.of(image))?
+            .with_blur_rad(self.pixels.sharpness.error_rad(image))
     }
 
     /// How far the image circle lies beside the calibration's, where both are seen.
@@ -213,6 +216,7 @@ impl TiltEstimator {
         let told = Told {
             off_px: image_edges.centre_off_px(),
             lights: image_edges.lights(),
+            blur_rad: image_edges.blur_rad(),
             steps: Steps::Known(image_edges.steps()),
         };
         Ok(self.fit(method, edges, &told, work))
@@ -274,6 +278,7 @@ impl TiltEstimator {
             aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),
             centre_off: self.centre_off(told.off_px),
+            blur_rad: told.blur_rad,
         };
         fit.into_estimate(&seen, &mut work.trusted)
     }

@@ -87,6 +87,7 @@ impl Fit {
     pub(super) fn into_estimate(self, seen: &Seen<'_>, trusted: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
         let (covariance, off_rad) = self.with_centre_off(seen);
+        let covariance = covariance.map(|covariance| confidence::with_blur(covariance, seen.blur_rad));
         let covariance = covariance.filter(|covariance| confidence::inverse_of_positive(covariance).is_some());
         let undetermined = self.tilt.is_some() && covariance.is_none();
         let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
@@ -238,6 +239,7 @@ mod tests {
             aspect: [0.0; ASPECT],
             trust,
             centre_off: None,
+            blur_rad: 0.0,
         }
     }
 

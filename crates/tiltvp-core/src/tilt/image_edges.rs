@@ -64,6 +64,7 @@ pub struct ImageEdges {
     centre_off_px: Option<Vector2<f64>>,
     lights: [f64; LIGHTS],
     steps: Arc<[u32]>,
+    blur_rad: f64,
 }
 
 impl ImageEdges {
@@ -88,6 +89,7 @@ impl ImageEdges {
             centre_off_px: None,
             lights: [0.0; LIGHTS],
             steps: Arc::default(),
+            blur_rad: 0.0,
         })
     }
 
@@ -124,6 +126,18 @@ impl ImageEdges {
     pub fn with_steps(mut self, steps: &[u32]) -> Result<Self> {
         check_ascending(steps)?;
         self.steps = steps.into();
+        Ok(self)
+    }
+
+    /// The same with by how much a tilt errs for the blur of the image, as [`blur_rad`](Self::blur_rad) tells it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless it is a finite number from 0 on.
+    pub fn with_blur_rad(mut self, blur_rad: f64) -> Result<Self> {
+        if !(blur_rad.is_finite() && blur_rad >= 0.0) {
+            return Err(Error::argument("edges", format!("a blur of {blur_rad} rad"), "a finite number from 0 on"));
+        }
+        self.blur_rad = blur_rad;
         Ok(self)
     }
 
@@ -170,6 +184,11 @@ impl ImageEdges {
     /// Numbers within the region of those that are steps of the pixel grid.
     pub fn steps(&self) -> &[u32] {
         &self.steps
+    }
+
+    /// Standard deviation in radians, in each direction, by which a tilt errs for the blur of the image.
+    pub fn blur_rad(&self) -> f64 {
+        self.blur_rad
     }
 
     /// Copies them to where the fits read them, if they are of this origin.

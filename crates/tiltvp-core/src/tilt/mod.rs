@@ -19,6 +19,7 @@ mod options;
 mod posterior;
 mod scratch;
 mod shared_tables;
+mod sharpness;
 mod shift_model;
 mod simplex;
 mod tables;

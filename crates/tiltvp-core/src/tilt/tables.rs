@@ -8,6 +8,7 @@ use super::image_circle::ImageCircle;
 use super::image_edges::EdgeOrigin;
 use super::lightness::Lightness;
 use super::shared_tables::SharedTables;
+use super::sharpness::Sharpness;
 use crate::edges::Region;
 use crate::error::Result;
 
@@ -25,6 +26,8 @@ pub(super) struct PixelTables {
     pub circle: Option<ImageCircle>,
     /// Where it is looked how light the view is.
     pub lightness: Lightness,
+    /// Where it is looked how wide the steps of an image are.
+    pub sharpness: Sharpness,
     /// What the methods look up.
     pub shared: SharedTables,
 }
@@ -46,7 +49,9 @@ impl PixelTables {
         let vertical = VanishingPoint::new(camera, robot_from_camera);
         let circle = ImageCircle::new(camera);
         let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());
-        Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, shared: SharedTables::default() })
+        let sharpness = Sharpness::new(&region, vertical.as_ref(), options);
+        let shared = SharedTables::default();
+        Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, sharpness, shared })
     }
 }
 

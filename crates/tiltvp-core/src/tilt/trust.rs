@@ -38,6 +38,8 @@ pub(super) struct Seen<'a> {
     pub trust: Option<&'static Trust>,
     /// A centre that is off.
     pub centre_off: Option<CentreOff<'a>>,
+    /// Standard deviation in radians, a side, for blur.
+    pub blur_rad: f64,
 }
 
 /// How it is told whether a method's fits are of the vertical: logistic regressions on views whose cameras, mountings or scenes
@@ -141,6 +143,9 @@ const AGREEING: f64 = 0.09;
 /// more, with noise of 10 to 40 grey levels half have 0.6 and more.
 const NOISY: f64 = 0.5;
 
+/// Share of the variance from which blur is named as the cause, before what blur does: edges that stray, few that agree.
+const BLURRED: f64 = 0.25;
+
 /// Edge pixels for each radian's worth of pixels below which there are few: a tenth of what views of rooms have.
 const EDGES: f64 = 20.0;
 
@@ -172,6 +177,8 @@ impl Doubt {
             Self::NotUp
         } else if let Some(limit_rad) = limit_rad {
             Self::Beyond { limit_rad }
+        } else if 2.0 * seen.blur_rad.powi(2) > BLURRED * estimate.covariance_rad2.trace() {
+            Self::Blurred { sigma_rad: seen.blur_rad }
         } else if (estimate.edge_pixels as f64) < EDGES * seen.pixels_per_rad {
             Self::FewEdges { pixels: estimate.edge_pixels }
         } else if crowded > NOISY {
@@ -230,6 +237,7 @@ mod tests {
             aspect: [0.0; ASPECT],
             trust: None,
             centre_off: None,
+            blur_rad: 0.0,
         }
     }
 
@@ -246,6 +254,10 @@ mod tests {
         assert!(matches!(of(&one_sided), Some(Doubt::OneSided { ratio }) if (ratio - 4.0).abs() < 1e-9));
         let few_agree = TiltEstimate { inlier_pixels: 300, ..one_sided };
         assert!(matches!(of(&few_agree), Some(Doubt::FewAgree { share }) if (share - 0.05).abs() < 1e-9));
+        let blurred = Seen { blur_rad: 0.02, ..seen(100_000, 150.0) };
+        let of_blurred = Doubt::of(&few_agree, &blurred, 0.0, true, None);
+        assert!(matches!(of_blurred, Some(Doubt::Blurred { sigma_rad: 0.02 })));
+        assert!(of_blurred.is_some_and(|doubt| doubt.to_string().contains("off by 1.1 degrees")));
         let noisy = Doubt::of(&few_agree, &seen(10_000, 150.0), 0.0, true, None);
         assert!(matches!(noisy, Some(Doubt::Noisy { share: 0.6 })));
         let few_edges = TiltEstimate { edge_pixels: 2900, ..few_agree };

@@ -57,7 +57,7 @@ impl ImageEdges {
         options: ([f64; 5], u32),
         mask: Option<&Bound<'_, PyAny>>,
         pixels: (PyReadonlyArray1<'_, u32>, [PyReadonlyArray1<'_, f32>; 2]),
-        seen: (Option<[f64; 2]>, Vec<f64>, PyReadonlyArray1<'_, u32>),
+        seen: (Option<[f64; 2]>, Vec<f64>, PyReadonlyArray1<'_, u32>, f64),
     ) -> PyResult<Self> {
         let ([gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px], row_stride) = options;
         let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
@@ -73,13 +73,14 @@ impl ImageEdges {
             row_stride,
         };
         let (slots, gradients) = pixels;
-        let (centre_off_px, lights, steps) = seen;
+        let (centre_off_px, lights, steps, blur_rad) = seen;
         let steps = steps.to_vec()?;
         let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
         let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?)
             .and_then(|edges| edges.with_centre_off_px(centre_off_px.map(Into::into)))
             .and_then(|edges| edges.with_lights(&lights))
-            .and_then(|edges| edges.with_steps(&steps));
+            .and_then(|edges| edges.with_steps(&steps))
+            .and_then(|edges| edges.with_blur_rad(blur_rad));
         Ok(Self { inner: inner.map_err(|error| exception(&error))?, camera })
     }
 
@@ -95,7 +96,8 @@ impl ImageEdges {
         let off = this.inner.centre_off_px().map(<[f64; 2]>::from);
         let lights = this.inner.lights().to_vec();
         let steps = PyArray1::from_slice(py, this.inner.steps());
-        let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), (off, lights, steps));
+        let seen = (off, lights, steps, this.inner.blur_rad());
+        let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), seen);
         (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
     }
 }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["HARDSHIPS", "degrade_dataset", "degrade_image"]
+__all__ = ["HARDSHIPS", "degrade_dataset", "degrade_image", "turned", "unfocused"]
 
 HARDSHIPS: Final = ("hidden", "blurred", "dark")
 """What may befall an image: all but 20 to 160 degrees of azimuth hidden; out of focus by 1.5 to 8 pixels; 4 to 40 % of
@@ -50,6 +50,22 @@ def degrade_image(
     else:
         raise InvalidInputError(f"hardship = {hardship!r}, expected one of {', '.join(HARDSHIPS)}")
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+
+
+def unfocused(gray: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """(H, W) uint8: out of focus by 2 to 8 pixels and without noise, as where a camera takes it away."""
+    return np.asarray(cv2.GaussianBlur(gray, (0, 0), rng.uniform(2.0, 8.0)), dtype=np.uint8)
+
+
+def turned(gray: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """(H, W) uint8: exposed while the robot turns by 1 to 8 degrees, as at 2 rad/s in 9 to 70 ms."""
+    height, width = gray.shape
+    whole = rng.uniform(1.0, 8.0)
+    middle = (0.5 * (width - 1), 0.5 * (height - 1))
+    turns = [cv2.getRotationMatrix2D(middle, share * whole, 1.0) for share in np.linspace(-0.5, 0.5, 17)]
+    seen = [cv2.warpAffine(gray, turn, (width, height), borderMode=cv2.BORDER_REPLICATE) for turn in turns]
+    noisy = np.mean(seen, axis=0) + rng.normal(0.0, 1.0, gray.shape)
+    return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
 
 
 def _window(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltvp.cameras import Camera
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
-from tiltvp.lab.datasets.degrading import degrade_image
+from tiltvp.lab.datasets.degrading import degrade_image, turned, unfocused
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import normal_from_alpha_beta
@@ -378,6 +378,8 @@ CASES: Final[dict[str, Make]] = {
     "ahead, boxes drawn": _harmed_ahead(_boxes),
     "ahead, last row repeated": _harmed_ahead(_cut_off),
     "ahead, JPEG of quality 10": _harmed_ahead(_compressed),
+    "out of focus": _harmed(unfocused),
+    "turned while exposed": _harmed(turned),
 }
 """What is done, by name."""
 

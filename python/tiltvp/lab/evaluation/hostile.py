@@ -43,6 +43,8 @@ CAUSES: Final = {
     "dark": "contrast",
     "over": "contrast",
     "blurred": "blur",
+    "focus": "blur",
+    "turned": "blur",
     "noisy": "noise",
     "noise": "noise",
     "texture": "texture",

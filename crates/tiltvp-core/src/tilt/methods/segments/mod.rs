@@ -248,6 +248,8 @@ impl SegmentFit {
             expected_max_rad: self.expected_max_rad,
             trust,
             centre_off,
+            // Edges that run into each other are not straight, or few.
+            blur_rad: 0.0,
         };
         fit.into_estimate(&seen, &mut pixel_work.trusted)
     }
