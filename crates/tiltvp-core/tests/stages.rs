@@ -207,3 +207,23 @@ fn wrong_edges_are_refused() {
     assert_eq!(none.clone().with_centre_off_px(Some(off)).unwrap().centre_off_px(), Some(off));
     assert!(none.with_centre_off_px(Some(off * f64::NAN)).unwrap_err().to_string().contains("centre"));
 }
+
+#[test]
+fn a_blurred_image_is_as_blurred_on_every_second_row() {
+    // Steps of twenty pixels, in mean levels of as many columns.
+    let mut image = stripes(&fisheye(SIDE), &Matrix3::identity(), &Tilt::from_alpha_beta(0.0, 0.0), 23, 0.0, 1);
+    let width = image.width;
+    for row in image.data.chunks_mut(width) {
+        let levels: Vec<u32> = row.iter().map(|level| u32::from(*level)).collect();
+        for (u, level) in row.iter_mut().enumerate() {
+            let near = &levels[u.saturating_sub(10)..(u + 10).min(width)];
+            *level = (near.iter().sum::<u32>() / near.len() as u32) as u8;
+        }
+    }
+    let blur = |row_stride| {
+        let estimator = new(TiltOptions { row_stride, ..TiltOptions::for_method("refined").unwrap() });
+        estimator.detect(&image.view(), &mut estimator.scratch()).unwrap().blur_rad()
+    };
+    assert!(blur(1) > 0.01);
+    assert!((blur(2) / blur(1) - 1.0).abs() < 1e-12);
+}

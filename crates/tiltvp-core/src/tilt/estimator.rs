@@ -166,7 +166,7 @@ impl TiltEstimator {
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
                 let of_up = method.trust().and_then(|trust| trust.up.as_ref());
                 let lights = of_up.map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
-                let blur_rad = self.pixels.sharpness.error_rad(image);
+                let blur_rad = self.pixels.sharpness.error_rad(image, gradient_min);
                 let told = Told { off_px, lights: &lights, blur_rad, steps: Steps::Of(image) };
                 Ok(self.fit(&**method, edges, &told, work))
             }
@@ -183,13 +183,14 @@ impl TiltEstimator {
         self.pixel_method()?;
         self.check_image(image)?;
         self.check_scratch(scratch)?;
+        let gradient_min = self.options.edges.gradient_min;
         let Scratch { detector, edges, .. } = scratch;
-        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, edges);
+        detector.detect(image, &self.pixels.region, gradient_min, None, edges);
         ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())?
             .with_centre_off_px(self.centre_off_px(image))?
             .with_steps(&Steps::Of(image).all(edges, &self.pixels.region))?
             .with_lights(&self.pixels.lightness.of(image))?
-            .with_blur_rad(self.pixels.sharpness.error_rad(image))
+            .with_blur_rad(self.pixels.sharpness.error_rad(image, gradient_min))
     }
 
     /// How far the image circle lies beside the calibration's, where both are seen.

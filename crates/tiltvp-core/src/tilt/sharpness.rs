@@ -3,7 +3,7 @@
 use tiltvp_kernels::vectorised;
 
 use super::correction::VanishingPoint;
-use crate::edges::{EdgeOptions, Region};
+use crate::edges::Region;
 use crate::image::ImageView;
 
 /// Rows that are looked at, or up to twice as many: most views have hundreds of steps on them.
@@ -39,8 +39,6 @@ pub(super) struct Sharpness {
     /// Pixels to each side of the near levels, and of the far ones.
     near: usize,
     far: usize,
-    /// Least difference of near levels.
-    step_min: i16,
     /// Standard deviation in radians over the squared ratio.
     error_rad: f64,
 }
@@ -56,7 +54,7 @@ struct Run {
 }
 
 impl Sharpness {
-    pub(super) fn new(region: &Region, vertical: Option<&VanishingPoint>, edges: &EdgeOptions) -> Self {
+    pub(super) fn new(region: &Region, vertical: Option<&VanishingPoint>) -> Self {
         let [width, height] = region.image_size();
         let scale = region.pixels_per_rad() / PIXELS_PER_RAD;
         let near = (scale.round() as usize).max(1);
@@ -77,36 +75,37 @@ impl Sharpness {
             let parts = parts.into_iter().filter(|(first, end, _)| first < end);
             runs.extend(parts.map(|(first, end, along_row)| Run { v: span.v, first, end, along_row }));
         }
-        let step_min = (edges.gradient_min / SCHARR).clamp(1.0, 255.0) as i16;
-        Self { runs, near, far, step_min, error_rad: ERROR_RAD * near as f64 / scale }
+        Self { runs, near, far, error_rad: ERROR_RAD * near as f64 / scale }
     }
 
-    /// Standard deviation in radians, a side, of the tilt for the width of the steps of an image; 0 if they are sharp, or few.
-    pub(super) fn error_rad(&self, image: &ImageView<'_>) -> f64 {
+    /// Standard deviation in radians, a side, of the tilt for the width of the steps of an image, which are those of pixels with
+    /// such a gradient; 0 if they are sharp, or few.
+    pub(super) fn error_rad(&self, image: &ImageView<'_>, gradient_min: f64) -> f64 {
+        let step_min = (gradient_min / SCHARR).clamp(1.0, 255.0) as i16;
         // What moves along a row blurs the edges that cross rows alone.
-        let beyond = [true, false].map(|along_row| self.beyond(image, along_row));
+        let beyond = [true, false].map(|along_row| self.beyond(image, along_row, step_min));
         self.error_rad * f64::max(beyond[0], beyond[1]).powi(2)
     }
 
     /// By how much the ratio of differences is beyond that of sharp steps, of edges that cross rows or columns.
-    fn beyond(&self, image: &ImageView<'_>, along_row: bool) -> f64 {
+    fn beyond(&self, image: &ImageView<'_>, along_row: bool, step_min: i16) -> f64 {
         let mut sums = [0i64; 3];
         for run in self.runs.iter().filter(|run| run.along_row == along_row) {
-            sums.iter_mut().zip(self.of_run(image, run)).for_each(|(sum, own)| *sum += i64::from(own));
+            sums.iter_mut().zip(self.of_run(image, run, step_min)).for_each(|(sum, own)| *sum += i64::from(own));
         }
         let [near, far, steps] = sums;
         if steps < LEAST { 0.0 } else { (far as f64 / near as f64 - SHARP).max(0.0) }
     }
 
     /// The [`sums`] of a run.
-    fn of_run(&self, image: &ImageView<'_>, &Run { v, first, end, along_row }: &Run) -> [i32; 3] {
+    fn of_run(&self, image: &ImageView<'_>, &Run { v, first, end, along_row }: &Run, step_min: i16) -> [i32; 3] {
         let in_row = |by: usize| [&image.row(v)[first - by..end - by], &image.row(v)[first + by..end + by]];
         let in_columns = |by: usize| [&image.row(v - by)[first..end], &image.row(v + by)[first..end]];
         let (near, far) = (self.near, self.far);
         if along_row {
-            sums(&in_row(near), &in_columns(near), &in_row(far), self.step_min)
+            sums(&in_row(near), &in_columns(near), &in_row(far), step_min)
         } else {
-            sums(&in_columns(near), &in_row(near), &in_columns(far), self.step_min)
+            sums(&in_columns(near), &in_row(near), &in_columns(far), step_min)
         }
     }
 }
@@ -141,6 +140,7 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, Model, Parameter};
+    use crate::edges::EdgeOptions;
 
     /// Of a camera that looks up, with stripes that go over into each other within so many pixels.
     fn of(size: u32, width_px: f64) -> f64 {
@@ -149,8 +149,7 @@ mod tests {
         let numbers: Vec<_> = numbers.iter().map(|(name, x)| ((*name).to_owned(), Parameter::Scalar(*x))).collect();
         let model = Model::from_parameters("equidistant", size, size, &numbers).unwrap();
         let camera = Camera::new(size, size, model).unwrap();
-        let edges = EdgeOptions { gradient_min: 150.0, ..EdgeOptions::default() };
-        let region = Region::new(&camera, &Matrix3::identity(), &edges, None).unwrap();
+        let region = Region::new(&camera, &Matrix3::identity(), &EdgeOptions::default(), None).unwrap();
         let stripe = side / 12.0;
         let level = |u: f64| {
             let off = (u / stripe - (u / stripe).round()) * stripe / width_px;
@@ -160,7 +159,8 @@ mod tests {
         };
         let image: Vec<u8> = (0..size * size).map(|i| level(f64::from(i % size)) as u8).collect();
         let size = size as usize;
-        Sharpness::new(&region, None, &edges).error_rad(&ImageView::new(&image, size, size, size).unwrap()).to_degrees()
+        let image = ImageView::new(&image, size, size, size).unwrap();
+        Sharpness::new(&region, None).error_rad(&image, 150.0).to_degrees()
     }
 
     #[test]

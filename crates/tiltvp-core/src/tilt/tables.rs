@@ -45,11 +45,11 @@ impl PixelTables {
         let (mut sectors, mut heights_deg): (Vec<_>, Vec<_>) = of_kept.map(|(_, note)| note).unzip();
         sectors.shrink_to_fit();
         heights_deg.shrink_to_fit();
-        let region = whole.every_row(*row_stride)?;
         let vertical = VanishingPoint::new(camera, robot_from_camera);
+        let sharpness = Sharpness::new(&whole, vertical.as_ref());
+        let region = whole.every_row(*row_stride)?;
         let circle = ImageCircle::new(camera);
         let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());
-        let sharpness = Sharpness::new(&region, vertical.as_ref(), options);
         let shared = SharedTables::default();
         Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, sharpness, shared })
     }
