@@ -15,12 +15,13 @@ import tiltvp
 from tiltvp import METHODS, TiltEstimator
 from tiltvp.cli import main
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
-from tiltvp.lab.datasets.degrading import turned, unfocused
+from tiltvp.lab.datasets.degrading import beneath, turned, unfocused
 from tiltvp.lab.datasets.hostile import AHEAD, CASES, FORWARD, UNHARMED, UPWARD, hostile_images
 from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
 from tiltvp.lab.evaluation.hostile import SURE, judge_images, summarise_cases
 from tiltvp.rotations import read_rotation
 from tiltvp.synth import render_room
+from tiltvp.tilt import normal_from_alpha_beta
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +128,19 @@ def test_a_room_out_of_focus_or_turned_while_exposed_is_not_believed() -> None:
     assert all(estimate.confidence < 0.5 for estimate in estimates)
     assert "the image is blurred" in estimates[0].reason
     kept = [pickle.loads(pickle.dumps(estimator.detect(image))) for image in harmed]
+    assert [estimator.estimate_edges(edges) for edges in kept] == estimates
+
+
+@pytest.mark.parametrize("widest_deg", [None, 12.0])
+def test_the_edge_of_a_table_or_beam_overhead_draws_no_tilt_aside(widest_deg: float | None) -> None:
+    estimator = TiltEstimator(UPWARD, method="refined")
+    image = render_room(UPWARD, kind="office", seed=1, alpha_rad=0.05, samples=2).gray
+    images = [beneath(image, UPWARD, np.random.default_rng(seed), widest_deg=widest_deg) for seed in range(8)]
+    estimates = [estimator(image) for image in images]
+    normal = normal_from_alpha_beta(0.05, 0.0)
+    errors = [math.degrees(math.acos(min(1.0, float(own.normal @ normal)))) for own in estimates]
+    assert max(errors) < 1.0
+    kept = [pickle.loads(pickle.dumps(estimator.detect(image))) for image in images]
     assert [estimator.estimate_edges(edges) for edges in kept] == estimates
 
 

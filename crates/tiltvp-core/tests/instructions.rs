@@ -25,8 +25,8 @@ use tiltvp_core::tilt::{METHODS, Scratch, TiltEstimate, TiltEstimator, TiltOptio
 /// Most instructions in the profile of the tests (with its checks of overflows; optimised builds take fewer), in thousands, by
 /// the names that valgrind shows: a twentieth to a tenth more than when they were last looked at.
 const LIMITS: [(&str, u64); 11] = [
-    // The tilt of one image of 240 x 240 pixels.
-    ("refined_image", 2450),
+    // The tilt of one image of 240 x 240 pixels, of stripes that go on over the vertical: some are left out as lines overhead.
+    ("refined_image", 3850),
     ("sampled_image", 1115),
     ("trimmed_image", 1050),
     ("consensus_image", 600),

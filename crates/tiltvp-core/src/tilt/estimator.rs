@@ -13,6 +13,7 @@ use super::lightness::LIGHTS;
 use super::methods::{Fitter, Prepared, Setting, edge_offset};
 use super::on_grid::{self, Steps};
 use super::options::TiltOptions;
+use super::overhead::OverheadLines;
 use super::scratch::Scratch;
 use super::tables::PixelTables;
 use super::trust::{ASPECT, Seen};
@@ -42,6 +43,7 @@ struct Told<'a> {
     off_px: Option<Vector2<f64>>,
     lights: &'a [f64; LIGHTS],
     blur_rad: f64,
+    overhead: OverheadLines,
     steps: Steps<'a>,
 }
 
@@ -167,7 +169,9 @@ impl TiltEstimator {
                 let of_up = method.trust().and_then(|trust| trust.up.as_ref());
                 let lights = of_up.map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
                 let blur_rad = self.pixels.sharpness.error_rad(image, gradient_min);
-                let told = Told { off_px, lights: &lights, blur_rad, steps: Steps::Of(image) };
+                let overhead = method.leaves_out_overhead().then(|| self.pixels.overhead.lines(image, gradient_min));
+                let overhead = overhead.unwrap_or_default();
+                let told = Told { off_px, lights: &lights, blur_rad, overhead, steps: Steps::Of(image) };
                 Ok(self.fit(&**method, edges, &told, work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
@@ -190,7 +194,8 @@ impl TiltEstimator {
             .with_centre_off_px(self.centre_off_px(image))?
             .with_steps(&Steps::Of(image).all(edges, &self.pixels.region))?
             .with_lights(&self.pixels.lightness.of(image))?
-            .with_blur_rad(self.pixels.sharpness.error_rad(image, gradient_min))
+            .with_blur_rad(self.pixels.sharpness.error_rad(image, gradient_min))?
+            .with_overhead(&self.pixels.overhead.lines(image, gradient_min).normals())
     }
 
     /// How far the image circle lies beside the calibration's, where both are seen.
@@ -218,6 +223,7 @@ impl TiltEstimator {
             off_px: image_edges.centre_off_px(),
             lights: image_edges.lights(),
             blur_rad: image_edges.blur_rad(),
+            overhead: image_edges.lines_overhead(),
             steps: Steps::Known(image_edges.steps()),
         };
         Ok(self.fit(method, edges, &told, work))
@@ -238,6 +244,7 @@ impl TiltEstimator {
     /// keep out only what the prefilters reject.
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, told: &Told<'_>, work: &mut Work) -> TiltEstimate {
         let pixels = &*self.pixels;
+        work.overhead = told.overhead;
         let fit = method.fit(edges, pixels, work);
         let estimate = self.conclude(method, edges, told, &fit, work);
         let Some(refitter) = method.refitter().filter(|_| estimate.tilt.is_some()) else { return estimate };

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::lightness::LIGHTS;
+use super::overhead::OverheadLines;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Mask, Region};
 use crate::error::{Error, Result};
@@ -65,6 +66,7 @@ pub struct ImageEdges {
     lights: [f64; LIGHTS],
     steps: Arc<[u32]>,
     blur_rad: f64,
+    overhead: OverheadLines,
 }
 
 impl ImageEdges {
@@ -90,6 +92,7 @@ impl ImageEdges {
             lights: [0.0; LIGHTS],
             steps: Arc::default(),
             blur_rad: 0.0,
+            overhead: OverheadLines::default(),
         })
     }
 
@@ -141,6 +144,16 @@ impl ImageEdges {
         Ok(self)
     }
 
+    /// The same with the lines overhead of the image, as [`overhead`](Self::overhead) tells them.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless they are unit vectors, eight at most.
+    pub fn with_overhead(mut self, normals: &[Vector3<f64>]) -> Result<Self> {
+        let got = || Error::argument("edges", format!("{} lines overhead", normals.len()), "up to eight unit vectors");
+        self.overhead = OverheadLines::of(normals).ok_or_else(got)?;
+        Ok(self)
+    }
+
     /// What they depend on beside the image.
     pub fn origin(&self) -> &Arc<EdgeOrigin> {
         &self.origin
@@ -189,6 +202,16 @@ impl ImageEdges {
     /// Standard deviation in radians, in each direction, by which a tilt errs for the blur of the image.
     pub fn blur_rad(&self) -> f64 {
         self.blur_rad
+    }
+
+    /// Normals in the robot frame, towards the brighter side, of the great circles of straight lines that go on over the vertical: none is an
+    /// upright edge.
+    pub fn overhead(&self) -> Vec<Vector3<f64>> {
+        self.overhead.normals()
+    }
+
+    pub(super) fn lines_overhead(&self) -> OverheadLines {
+        self.overhead
     }
 
     /// Copies them to where the fits read them, if they are of this origin.

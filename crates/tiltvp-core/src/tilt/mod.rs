@@ -16,6 +16,7 @@ mod lightness;
 mod methods;
 mod on_grid;
 mod options;
+mod overhead;
 mod posterior;
 mod scratch;
 mod shared_tables;

@@ -79,7 +79,7 @@ impl Steps<'_> {
             }
         }
         let steps = std::mem::replace(&mut work.steps, StepMap::new([0, 0]));
-        work.keep(|slot, edge| !steps.has(place(region, slot), gradient(edges, edge)));
+        work.keep(|_, slot, edge| !steps.has(place(region, slot), gradient(edges, edge)));
         work.steps = steps;
     }
 }

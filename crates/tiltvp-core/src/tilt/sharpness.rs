@@ -81,7 +81,7 @@ impl Sharpness {
     /// Standard deviation in radians, a side, of the tilt for the width of the steps of an image, which are those of pixels with
     /// such a gradient; 0 if they are sharp, or few.
     pub(super) fn error_rad(&self, image: &ImageView<'_>, gradient_min: f64) -> f64 {
-        let step_min = (gradient_min / SCHARR).clamp(1.0, 255.0) as i16;
+        let step_min = step_min(gradient_min);
         // What moves along a row blurs the edges that cross rows alone.
         let beyond = [true, false].map(|along_row| self.beyond(image, along_row, step_min));
         self.error_rad * f64::max(beyond[0], beyond[1]).powi(2)
@@ -108,6 +108,11 @@ impl Sharpness {
             sums(&in_columns(near), &in_row(near), &in_columns(far), step_min)
         }
     }
+}
+
+/// The difference of levels two pixels apart of an edge with such a gradient.
+pub(super) fn step_min(gradient_min: f64) -> i16 {
+    (gradient_min / SCHARR).clamp(1.0, 255.0) as i16
 }
 
 vectorised! {

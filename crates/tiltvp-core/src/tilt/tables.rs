@@ -7,6 +7,7 @@ use super::correction::VanishingPoint;
 use super::image_circle::ImageCircle;
 use super::image_edges::EdgeOrigin;
 use super::lightness::Lightness;
+use super::overhead::Overhead;
 use super::shared_tables::SharedTables;
 use super::sharpness::Sharpness;
 use crate::edges::Region;
@@ -28,6 +29,8 @@ pub(super) struct PixelTables {
     pub lightness: Lightness,
     /// Where it is looked how wide the steps of an image are.
     pub sharpness: Sharpness,
+    /// Where lines overhead are looked for.
+    pub overhead: Overhead,
     /// What the methods look up.
     pub shared: SharedTables,
 }
@@ -46,12 +49,13 @@ impl PixelTables {
         sectors.shrink_to_fit();
         heights_deg.shrink_to_fit();
         let vertical = VanishingPoint::new(camera, robot_from_camera);
+        let overhead = Overhead::new(origin, whole.pixels_per_rad());
         let sharpness = Sharpness::new(&whole, vertical.as_ref());
         let region = whole.every_row(*row_stride)?;
         let circle = ImageCircle::new(camera);
         let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());
         let shared = SharedTables::default();
-        Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, sharpness, shared })
+        Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, sharpness, overhead, shared })
     }
 }
 
@@ -86,7 +90,8 @@ fn back_sector(side: f64) -> u8 {
     sector(side.abs() - 1.0, side)
 }
 
-fn sector(x: f64, y: f64) -> u8 {
+/// The sector of azimuth of a direction.
+pub(super) fn sector(x: f64, y: f64) -> u8 {
     let turn = y.atan2(x) / std::f64::consts::TAU + 0.5;
     ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8
 }

@@ -1,9 +1,11 @@
 //! What the fits of one thread work in.
 
+use nalgebra::Vector3;
 use tiltvp_kernels::compaction::ROOM;
 
 use super::methods::sampling::SamplingScratch;
 use super::methods::subsample::Subsample;
+use super::overhead::OverheadLines;
 use super::trust::FEATURES;
 use crate::edges::StepMap;
 use crate::robust::Rows;
@@ -18,6 +20,8 @@ pub(super) struct Work {
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
     pub inliers: Inliers,
+    /// Lines overhead, for the methods that leave them out.
+    pub overhead: OverheadLines,
     /// Steps of the pixel grid among the rows.
     pub steps: StepMap,
     /// Of the refined method.
@@ -54,6 +58,7 @@ impl Work {
             slots: Vec::with_capacity(n + ROOM),
             places: Vec::with_capacity(n + ROOM),
             inliers: Inliers::None,
+            overhead: OverheadLines::default(),
             steps: StepMap::new(size),
             subsample: Subsample::with_capacity(n),
             sampling: SamplingScratch::default(),
@@ -61,11 +66,12 @@ impl Work {
         }
     }
 
-    /// Keeps the rows alone that pass a test of their pixel within the region and their place among the edge pixels.
-    pub(super) fn keep(&mut self, test: impl Fn(u32, u32) -> bool) {
+    /// Keeps the rows alone that pass a test of themselves, their pixel within the region and their place among the edge pixels.
+    pub(super) fn keep(&mut self, test: impl Fn(&Vector3<f64>, u32, u32) -> bool) {
         let mut kept = 0;
         for row in 0..self.rows.len() {
-            if test(self.slots[row], self.places[row]) {
+            let observed = self.rows.get(row).unwrap_or_default();
+            if test(&observed, self.slots[row], self.places[row]) {
                 self.rows.put(row, kept);
                 self.weights[kept] = self.weights[row];
                 (self.slots[kept], self.places[kept]) = (self.slots[row], self.places[row]);

@@ -13,6 +13,9 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::value::frozen;
 
+/// Normals of great circles.
+type Normals = Vec<[f64; 3]>;
+
 /// The edge pixels of one image and their gradients: every pixel of the band of at least `gradient_min`.
 ///
 /// `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
@@ -56,8 +59,8 @@ impl ImageEdges {
         robot_from_camera: &Bound<'_, PyAny>,
         options: ([f64; 5], u32),
         mask: Option<&Bound<'_, PyAny>>,
-        pixels: (PyReadonlyArray1<'_, u32>, [PyReadonlyArray1<'_, f32>; 2]),
-        seen: (Option<[f64; 2]>, Vec<f64>, PyReadonlyArray1<'_, u32>, f64),
+        pixels: ([PyReadonlyArray1<'_, u32>; 2], [PyReadonlyArray1<'_, f32>; 2]),
+        seen: (Option<[f64; 2]>, Vec<f64>, f64, Normals),
     ) -> PyResult<Self> {
         let ([gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px], row_stride) = options;
         let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
@@ -72,15 +75,17 @@ impl ImageEdges {
             mask: mask.transpose()?,
             row_stride,
         };
-        let (slots, gradients) = pixels;
-        let (centre_off_px, lights, steps, blur_rad) = seen;
+        let ([slots, steps], gradients) = pixels;
+        let (centre_off_px, lights, blur_rad, overhead) = seen;
+        let overhead: Vec<_> = overhead.into_iter().map(Into::into).collect();
         let steps = steps.to_vec()?;
         let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
         let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?)
             .and_then(|edges| edges.with_centre_off_px(centre_off_px.map(Into::into)))
             .and_then(|edges| edges.with_lights(&lights))
             .and_then(|edges| edges.with_steps(&steps))
-            .and_then(|edges| edges.with_blur_rad(blur_rad));
+            .and_then(|edges| edges.with_blur_rad(blur_rad))
+            .and_then(|edges| edges.with_overhead(&overhead));
         Ok(Self { inner: inner.map_err(|error| exception(&error))?, camera })
     }
 
@@ -91,12 +96,12 @@ impl ImageEdges {
         let options = [o.gradient_min, o.smoothing_px, o.elevation_min_rad, o.elevation_max_rad, o.margin_px];
         let options = (options, *row_stride);
         let mask = mask.as_ref().map(|mask| convert::to_mask(py, mask)).transpose()?;
-        let slots = PyArray1::from_slice(py, this.inner.slots());
+        let slots = [this.inner.slots(), this.inner.steps()].map(|slots| PyArray1::from_slice(py, slots));
         let gradients = [this.inner.gx(), this.inner.gy()].map(|g| PyArray1::from_slice(py, g));
         let off = this.inner.centre_off_px().map(<[f64; 2]>::from);
         let lights = this.inner.lights().to_vec();
-        let steps = PyArray1::from_slice(py, this.inner.steps());
-        let seen = (off, lights, steps, this.inner.blur_rad());
+        let overhead: Normals = this.inner.overhead().into_iter().map(Into::into).collect();
+        let seen = (off, lights, this.inner.blur_rad(), overhead);
         let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), seen);
         (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
     }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["HARDSHIPS", "degrade_dataset", "degrade_image", "turned", "unfocused"]
+__all__ = ["HARDSHIPS", "beneath", "degrade_dataset", "degrade_image", "turned", "unfocused"]
 
 HARDSHIPS: Final = ("hidden", "blurred", "dark")
 """What may befall an image: all but 20 to 160 degrees of azimuth hidden; out of focus by 1.5 to 8 pixels; 4 to 40 % of
@@ -31,6 +31,8 @@ the light with noise of 2 to 6 grey levels."""
 _NOISE: Final = 2.0
 _HIDDEN_LEVEL: Final = 40.0
 _SHADE_RAD: Final = math.radians(20.0)
+_EDGE_RAD: Final = math.radians(0.4)
+"""Width of an edge in focus: a pixel of the upward camera."""
 
 
 def degrade_image(
@@ -68,11 +70,38 @@ def turned(gray: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
 
 
-def _window(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(H, W) in [0, 1]: one within an azimuth about the optical axis, fading so gently that no edge appears."""
+def beneath(
+    gray: NDArray[np.uint8], camera: Camera, rng: np.random.Generator, *, widest_deg: float | None = None
+) -> NDArray[np.uint8]:
+    """(H, W) uint8: beneath a beam of 1 to `widest_deg` degrees, or a table that hides a side.
+
+    Its edges are straight in space; the first passes the optical axis within 10 degrees.
+    """
+    bearings, azimuth, first = _bearings(camera), rng.uniform(-math.pi, math.pi), rng.uniform(-10.0, 10.0)
+    last = 90.0 if widest_deg is None else first + rng.uniform(1.0, widest_deg)
+    across, up = bearings @ [math.cos(azimuth), math.sin(azimuth), 0.0], bearings[..., 2]
+
+    def beyond(angle_deg: float) -> NDArray[np.float64]:
+        angle = math.radians(angle_deg)
+        aside = across * math.cos(angle) - up * math.sin(angle)
+        return np.asarray(np.clip(0.5 + aside / _EDGE_RAD, 0.0, 1.0))
+
+    hidden = beyond(first) * (1.0 - beyond(last)) * (up > 0.0)
+    image = gray + hidden * (rng.uniform(10.0, 245.0) - gray) + rng.normal(0.0, _NOISE, gray.shape)
+    return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+
+
+def _bearings(camera: Camera) -> NDArray[np.float64]:
+    """(H, W, 3): of each pixel; zero outside of the lens."""
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     bearings = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
-    azimuth = np.nan_to_num(np.arctan2(bearings[:, 1], bearings[:, 0])).reshape(u.shape)
+    return np.asarray(np.nan_to_num(bearings).reshape(*u.shape, 3), dtype=np.float64)
+
+
+def _window(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
+    """(H, W) in [0, 1]: one within an azimuth about the optical axis, fading so gently that no edge appears."""
+    bearings = _bearings(camera)
+    azimuth = np.arctan2(bearings[..., 1], bearings[..., 0])
     half, middle = 0.5 * math.radians(rng.uniform(20.0, 160.0)), rng.uniform(-math.pi, math.pi)
     away = np.abs((azimuth - middle + math.pi) % (2.0 * math.pi) - math.pi)
     return np.asarray(np.clip((half + _SHADE_RAD - away) / _SHADE_RAD, 0.0, 1.0), dtype=np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltvp.cameras import Camera
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
-from tiltvp.lab.datasets.degrading import degrade_image, turned, unfocused
+from tiltvp.lab.datasets.degrading import beneath, degrade_image, turned, unfocused
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import normal_from_alpha_beta
@@ -34,6 +34,7 @@ UPWARD: Final = paper_camera()
 AHEAD: Final = AHEAD_CAMERAS["pinhole 80"]
 WHOLE: Final = Camera.equirectangular(width=800, height=400)
 GREY: Final = 110.0
+THETA_MAX_RAD: Final = np.deg2rad(92.5)
 
 
 @dataclass(frozen=True)
@@ -124,21 +125,14 @@ def _bytes(levels: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _equidistant(**changes: Any) -> Camera:
-    parts = {
-        "width": 640,
-        "height": 480,
-        "focal_px": 139.7,
-        "cx": 319.5,
-        "cy": 239.5,
-        "max_theta_rad": np.deg2rad(92.5),
-    }
+    parts = {"width": 640, "height": 480, "focal_px": 139.7, "cx": 319.5, "cy": 239.5, "max_theta_rad": THETA_MAX_RAD}
     return Camera.equidistant(**parts | changes)
 
 
 def focal_off(rng: np.random.Generator, share: float = 0.1) -> Camera:
     """The upward camera with a focal length that is off by a share, either way."""
     focal = 139.7 * (1.0 + share * rng.choice([-1.0, 1.0]))
-    return _equidistant(focal_px=focal, max_theta_rad=np.deg2rad(92.5) * 139.7 / focal)
+    return _equidistant(focal_px=focal, max_theta_rad=THETA_MAX_RAD * 139.7 / focal)
 
 
 def pinhole_focal_off(rng: np.random.Generator, share: float = 0.1) -> Camera:
@@ -380,6 +374,8 @@ CASES: Final[dict[str, Make]] = {
     "ahead, JPEG of quality 10": _harmed_ahead(_compressed),
     "out of focus": _harmed(unfocused),
     "turned while exposed": _harmed(turned),
+    "beneath a table": _harmed(lambda image, rng: beneath(image, UPWARD, rng)),
+    "beneath a beam": _harmed(lambda image, rng: beneath(image, UPWARD, rng, widest_deg=12.0)),
 }
 """What is done, by name."""
 

@@ -106,6 +106,11 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
     /// that has served before.
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit;
 
+    /// Whether it leaves out lines overhead.
+    fn leaves_out_overhead(&self) -> bool {
+        false
+    }
+
     /// What fits again without steps of the pixel grid, if the method leaves them out.
     fn refitter(&self) -> Option<&dyn Refitter> {
         None

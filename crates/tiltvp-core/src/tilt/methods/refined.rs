@@ -145,7 +145,13 @@ impl Fitter for Refined {
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
         self.normals.lift(edges, work);
+        let lines = work.overhead;
+        pixels.overhead.leave_out(&lines, pixels, work);
         self.refit(pixels, work)
+    }
+
+    fn leaves_out_overhead(&self) -> bool {
+        true
     }
 
     fn refitter(&self) -> Option<&dyn Refitter> {
