@@ -135,11 +135,11 @@ def test_a_room_out_of_focus_or_turned_while_exposed_is_not_believed() -> None:
 def test_the_edge_of_a_table_or_beam_overhead_draws_no_tilt_aside(widest_deg: float | None) -> None:
     estimator = TiltEstimator(UPWARD, method="refined")
     image = render_room(UPWARD, kind="office", seed=1, alpha_rad=0.05, samples=2).gray
-    images = [beneath(image, UPWARD, np.random.default_rng(seed), widest_deg=widest_deg) for seed in range(8)]
-    estimates = [estimator(image) for image in images]
     normal = normal_from_alpha_beta(0.05, 0.0)
+    images = [beneath(image, UPWARD, normal, np.random.default_rng(seed), widest_deg) for seed in range(8)]
+    estimates = [estimator(image) for image in images]
     errors = [math.degrees(math.acos(min(1.0, float(own.normal @ normal)))) for own in estimates]
-    assert max(errors) < 1.0
+    assert max(errors) < 1.3
     kept = [pickle.loads(pickle.dumps(estimator.detect(image))) for image in images]
     assert [estimator.estimate_edges(edges) for edges in kept] == estimates
 

@@ -1314,7 +1314,7 @@ class EdgeElements:
 
     @property
     def prefiltered(self) -> NDArray[np.bool_]:
-        """(N,): the pixels that passed the prefilter."""
+        """(N,): the pixels that passed the prefilter and were not left out."""
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -2984,7 +2984,7 @@ class TiltEstimate:
 
     @property
     def prefiltered_pixels(self) -> int:
-        """Edge pixels that passed the prefilter."""
+        """Edge pixels that passed the prefilter and were not left out."""
 
     @property
     def reason(self) -> str:

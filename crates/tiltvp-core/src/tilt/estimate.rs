@@ -30,7 +30,7 @@ pub struct TiltEstimate {
     pub confidence: f64,
     /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
     pub edge_pixels: usize,
-    /// Edge pixels that passed the prefilter.
+    /// Edge pixels that passed the prefilter and were not left out.
     pub prefiltered_pixels: usize,
     /// Edge pixels that agree with the estimate.
     pub inlier_pixels: usize,
@@ -73,7 +73,7 @@ pub struct EdgeElement {
     /// Unit normal of the edge's great circle in the robot frame, as the method makes it (eq. 37 or exact); NaN for the
     /// image-space methods, which have none.
     pub normal: [f32; 3],
-    /// Whether it passed the prefilter.
+    /// Whether it passed the prefilter and was not left out.
     pub prefiltered: bool,
     /// Whether it agrees with the estimate.
     pub inlier: bool,

@@ -44,7 +44,7 @@ value! {
         confidence: f64,
         /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
         edge_pixels: usize,
-        /// Edge pixels that passed the prefilter.
+        /// Edge pixels that passed the prefilter and were not left out.
         prefiltered_pixels: usize,
         /// Edge pixels that agree with the estimate.
         inlier_pixels: usize,
@@ -187,7 +187,7 @@ value! {
         ///
         /// Those of the method, before any prefilter; NaN for the image-space methods, which have none.
         normal: Vec<[f32; 3]>,
-        /// (N,): the pixels that passed the prefilter.
+        /// (N,): the pixels that passed the prefilter and were not left out.
         prefiltered: Vec<bool>,
         /// (N,): the pixels that agree with the estimate.
         inlier: Vec<bool>,

@@ -71,22 +71,27 @@ def turned(gray: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
 
 
 def beneath(
-    gray: NDArray[np.uint8], camera: Camera, rng: np.random.Generator, *, widest_deg: float | None = None
+    gray: NDArray[np.uint8],
+    camera: Camera,
+    up: NDArray[np.float64],
+    rng: np.random.Generator,
+    widest_deg: float | None = None,
 ) -> NDArray[np.uint8]:
-    """(H, W) uint8: beneath a beam of 1 to `widest_deg` degrees, or a table that hides a side.
+    """(H, W) uint8: beneath a level beam of 1 to `widest_deg` degrees, or a table that hides a side.
 
-    Its edges are straight in space; the first passes the optical axis within 10 degrees.
+    `up` (3,) is the vertical in the camera frame. Its edges are straight in space, the first within 10 degrees of `up`.
     """
     bearings, azimuth, first = _bearings(camera), rng.uniform(-math.pi, math.pi), rng.uniform(-10.0, 10.0)
     last = 90.0 if widest_deg is None else first + rng.uniform(1.0, widest_deg)
-    across, up = bearings @ [math.cos(azimuth), math.sin(azimuth), 0.0], bearings[..., 2]
+    level = np.cross(up, [math.cos(azimuth), math.sin(azimuth), 0.0])
+    across, above = bearings @ (level / np.linalg.norm(level)), bearings @ up
 
     def beyond(angle_deg: float) -> NDArray[np.float64]:
         angle = math.radians(angle_deg)
-        aside = across * math.cos(angle) - up * math.sin(angle)
+        aside = across * math.cos(angle) - above * math.sin(angle)
         return np.asarray(np.clip(0.5 + aside / _EDGE_RAD, 0.0, 1.0))
 
-    hidden = beyond(first) * (1.0 - beyond(last)) * (up > 0.0)
+    hidden = beyond(first) * (1.0 - beyond(last)) * (above > 0.0)
     image = gray + hidden * (rng.uniform(10.0, 245.0) - gray) + rng.normal(0.0, _NOISE, gray.shape)
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 

@@ -329,6 +329,10 @@ def _with_hardship(hardship: str) -> Make:
     return _harmed(lambda image, rng: degrade_image(image, hardship, UPWARD, rng))
 
 
+def _beneath(widest_deg: float | None = None) -> Make:
+    return lambda place, rng: (beneath(place.upward(), UPWARD, place.lean, rng, widest_deg), UPWARD, UP, place.lean)
+
+
 CASES: Final[dict[str, Make]] = {
     "upward": _told(UPWARD, UP, UP),
     "ahead": _told(AHEAD, FORWARD, FORWARD),
@@ -374,8 +378,8 @@ CASES: Final[dict[str, Make]] = {
     "ahead, JPEG of quality 10": _harmed_ahead(_compressed),
     "out of focus": _harmed(unfocused),
     "turned while exposed": _harmed(turned),
-    "beneath a table": _harmed(lambda image, rng: beneath(image, UPWARD, rng)),
-    "beneath a beam": _harmed(lambda image, rng: beneath(image, UPWARD, rng, widest_deg=12.0)),
+    "beneath a table": _beneath(),
+    "beneath a beam": _beneath(12.0),
 }
 """What is done, by name."""
 

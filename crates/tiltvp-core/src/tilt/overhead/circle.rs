@@ -10,7 +10,7 @@ use crate::tilt::image_edges::EdgeOrigin;
 /// Places on each circle: some two pixels apart in images of 640 x 480 pixels.
 const PLACES: usize = 256;
 
-/// Largest reach of a step: images in which it would be larger are of a few hundred pixels.
+/// Largest reach of a step: it would be larger in images of some thirty pixels alone.
 const REACH_MAX: usize = 16;
 
 /// Places by which a step may lie beside a great circle: 1.8 degrees on the largest circle.
