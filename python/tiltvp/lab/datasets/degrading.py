@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["HARDSHIPS", "beneath", "degrade_dataset", "degrade_image", "turned", "unfocused"]
+__all__ = ["HARDSHIPS", "beneath", "degrade_dataset", "degrade_image", "pixel_bearings", "turned", "unfocused"]
 
 HARDSHIPS: Final = ("hidden", "blurred", "dark")
 """What may befall an image: all but 20 to 160 degrees of azimuth hidden; out of focus by 1.5 to 8 pixels; 4 to 40 % of
@@ -79,9 +79,9 @@ def beneath(
 ) -> NDArray[np.uint8]:
     """(H, W) uint8: beneath a level beam of 1 to `widest_deg` degrees, or a table that hides a side.
 
-    `up` (3,) is the vertical in the camera frame. Its edges are straight in space, the first within 10 degrees of `up`.
+    `up` (3,) is the vertical in the camera frame. Edges are straight in space, the first one within 10 degrees of it.
     """
-    bearings, azimuth, first = _bearings(camera), rng.uniform(-math.pi, math.pi), rng.uniform(-10.0, 10.0)
+    bearings, azimuth, first = pixel_bearings(camera), rng.uniform(-math.pi, math.pi), rng.uniform(-10.0, 10.0)
     last = 90.0 if widest_deg is None else first + rng.uniform(1.0, widest_deg)
     level = np.cross(up, [math.cos(azimuth), math.sin(azimuth), 0.0])
     across, above = bearings @ (level / np.linalg.norm(level)), bearings @ up
@@ -96,7 +96,7 @@ def beneath(
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
-def _bearings(camera: Camera) -> NDArray[np.float64]:
+def pixel_bearings(camera: Camera) -> NDArray[np.float64]:
     """(H, W, 3): of each pixel; zero outside of the lens."""
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     bearings = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
@@ -105,7 +105,7 @@ def _bearings(camera: Camera) -> NDArray[np.float64]:
 
 def _window(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
     """(H, W) in [0, 1]: one within an azimuth about the optical axis, fading so gently that no edge appears."""
-    bearings = _bearings(camera)
+    bearings = pixel_bearings(camera)
     azimuth = np.arctan2(bearings[..., 1], bearings[..., 0])
     half, middle = 0.5 * math.radians(rng.uniform(20.0, 160.0)), rng.uniform(-math.pi, math.pi)
     away = np.abs((azimuth - middle + math.pi) % (2.0 * math.pi) - math.pi)

@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltvp.cameras import Camera
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, FORWARD
-from tiltvp.lab.datasets.degrading import beneath, degrade_image, turned, unfocused
+from tiltvp.lab.datasets.degrading import beneath, degrade_image, pixel_bearings, turned, unfocused
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import normal_from_alpha_beta
@@ -242,9 +242,7 @@ _UPWARD_BEARINGS: list[NDArray[np.float32]] = []
 def _bearings() -> NDArray[np.float32]:
     """(H, W, 3): of the pixels of the upward camera; zero outside of the lens."""
     if not _UPWARD_BEARINGS:
-        v, u = np.indices((480, 640)).astype(np.float64)
-        bearings = UPWARD.unproject(np.column_stack([u.ravel(), v.ravel()]))
-        _UPWARD_BEARINGS.append(np.nan_to_num(bearings).astype(np.float32).reshape(480, 640, 3))
+        _UPWARD_BEARINGS.append(pixel_bearings(UPWARD).astype(np.float32))
     return _UPWARD_BEARINGS[0]
 
 
