@@ -69,17 +69,27 @@ impl LineTables {
 
 /// From 255 and 0 the distances to the nearest 0, along rows, columns or both, of an image whose border is 0.
 fn distances(mut values: Vec<u8>, width: usize) -> Vec<u8> {
-    let relax = |values: &mut [u8], at: usize, before: [usize; 4]| {
-        let nearest = before.into_iter().map(|k| values[k]).min().unwrap_or(0);
-        values[at] = values[at].min(nearest.saturating_add(1));
+    // The neighbours in the row before first, all at once, then those along the row, one after the other.
+    let relax = |row: &mut [u8], before: &[u8]| {
+        for (at, three) in row[1..].iter_mut().zip(before.windows(3)) {
+            *at = (*at).min(three[0].min(three[1]).min(three[2]).saturating_add(1));
+        }
     };
-    let inner = |at: &usize| (1..width.saturating_sub(1)).contains(&(at % width));
-    let rows = width..values.len().saturating_sub(width);
-    for at in rows.clone().filter(inner) {
-        relax(&mut values, at, [at - 1, at - width - 1, at - width, at - width + 1]);
+    let along = |nearest: u8, at: &mut u8| {
+        *at = (*at).min(nearest.saturating_add(1));
+        *at
+    };
+    let height = values.len() / width;
+    for v in 1..height.saturating_sub(1) {
+        let (above, row) = values.split_at_mut(v * width);
+        relax(&mut row[..width], &above[above.len() - width..]);
+        row[..width].iter_mut().fold(0, along);
     }
-    for at in rows.rev().filter(inner) {
-        relax(&mut values, at, [at + 1, at + width - 1, at + width, at + width + 1]);
+    for v in (1..height.saturating_sub(1)).rev() {
+        let (row, below) = values.split_at_mut((v + 1) * width);
+        let row = &mut row[v * width..];
+        relax(row, &below[..width]);
+        row.iter_mut().rev().fold(0, along);
     }
     values
 }
@@ -87,17 +97,18 @@ fn distances(mut values: Vec<u8>, width: usize) -> Vec<u8> {
 /// The elevations that three quarters of the directions see, of those that see any.
 fn band_of(region: &Region) -> (f64, f64) {
     const SECTORS: usize = 90;
-    let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); SECTORS];
+    let mut seen = [(f32::INFINITY, f32::NEG_INFINITY); SECTORS];
     let of_each = region.bearing_table(|ray| {
-        let turn = ray.y.atan2(ray.x) / std::f64::consts::TAU + 0.5;
-        (((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8, ray.z.atan2(ray.xy().norm()) as f32)
+        let turn = (ray.y as f32).atan2(ray.x as f32) / std::f32::consts::TAU + 0.5;
+        (((turn * SECTORS as f32) as usize).min(SECTORS - 1) as u8, (ray.z / ray.xy().norm()) as f32)
     });
-    for (sector, elevation) in of_each {
+    for (sector, tangent) in of_each {
         let (low, high) = &mut seen[usize::from(sector)];
-        (*low, *high) = (low.min(f64::from(elevation)), high.max(f64::from(elevation)));
+        (*low, *high) = (low.min(tangent), high.max(tangent));
     }
-    let sorted = |pick: fn(&(f64, f64)) -> f64| {
-        let mut values: Vec<f64> = seen.iter().filter(|sector| sector.0 <= sector.1).map(pick).collect();
+    let sorted = |pick: fn(&(f32, f32)) -> f32| {
+        let tangents = seen.iter().filter(|sector| sector.0 <= sector.1).map(pick);
+        let mut values: Vec<f64> = tangents.map(|tangent| f64::from(tangent).atan()).collect();
         values.sort_by(f64::total_cmp);
         values
     };
