@@ -15,7 +15,7 @@ START: dict[str, Any] = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_s
 OTHER: dict[str, Any] = {
     "start": (0.1, 0.1, 0.1), "start_sigma": (0.1, 0.1, 0.3), "gate_probability": 0.9, "keyframes_max": 8,
     "step_sigma_m": 0.01, "step_sigma_rad": 0.01, "estimate_odometry": True, "estimate_time_offset": True,
-    "estimate_centre": True, "max_iterations": 1, "jackknife_parts": 3,
+    "estimate_centre": True, "estimate_rolling_shutter": True, "max_iterations": 1, "jackknife_parts": 3,
 }  # fmt: skip
 """Another value of each option but of lengths, angles and factors, of which there is half as much again."""
 

@@ -342,6 +342,22 @@ def test_rows_that_are_read_one_after_another_are_suspect(seed: int) -> None:
     calibrator = tiltvp.SelfCalibrator(**drive.options)
     calibrator.follow(drive.odometry, drive.bearings)
     assert calibrator.estimate.suspect == "rolling_shutter"
+    found = tiltvp.calibrate(drive.odometry, drive.bearings, **drive.options, estimate_rolling_shutter=True)
+    error = np.array([found.mounting.x_m, found.mounting.y_m, found.mounting.yaw_rad]) - drive.truth
+    assert found
+    assert float(np.max(np.abs(error) / np.sqrt(np.diag(drive.bound)))) < 5.0
+    late, sigma = np.hypot(*found.rolling_shutter_s), np.hypot(*found.rolling_shutter_sigma_s)
+    assert late == pytest.approx(0.5 * 0.03 * 300 / 480 / 0.1, abs=3.0 * sigma)
+
+
+def test_the_command_tells_a_rolling_shutter_that_it_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = write(tmp_path, one("rows read in 30 ms", 460110))
+    assert main(words) == 1
+    assert "try estimate_rolling_shutter, or drive more slowly" in capsys.readouterr().out
+    assert main([*words, "--estimate-rolling-shutter"]) == 0
+    assert "rolling shutter: lines forward in the camera are seen" in capsys.readouterr().out
 
 
 def test_the_table_counts_as_it_says() -> None:

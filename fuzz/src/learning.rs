@@ -15,6 +15,7 @@ pub fn log(data: &[u8]) {
         estimate_odometry: bytes.flag(),
         estimate_time_offset: bytes.flag(),
         estimate_centre: bytes.flag(),
+        estimate_rolling_shutter: bytes.flag(),
         max_iterations: 10,
         jackknife_parts: if bytes.byte() < 16 { 2 } else { 0 },
     };

@@ -2064,6 +2064,17 @@ class LogCalibration:
         """Standard deviation of it; 0 where it was not estimated."""
 
     @property
+    def rolling_shutter_s(self) -> NDArray[np.float64]:
+        """Fresh (2,) float64: how much later than in the middle of the image lines along bearings 0 and 90 degrees are
+        seen, as through a rolling shutter: seconds, in a log without times steps; 0 where it was not estimated. Others
+        by the cosine of their bearing of the one and the sine of the other.
+        """
+
+    @property
+    def rolling_shutter_sigma_s(self) -> NDArray[np.float64]:
+        """Fresh (2,) float64: standard deviations of it; 0 where it was not estimated."""
+
+    @property
     def time_offset_s(self) -> float:
         """By how much bearings are later than the odometry, seconds; 0 where it was not estimated."""
 
@@ -3388,6 +3399,7 @@ def calibrate(
     estimate_odometry: bool | None = None,
     estimate_time_offset: bool | None = None,
     estimate_centre: bool | None = None,
+    estimate_rolling_shutter: bool | None = None,
     max_iterations: SupportsIndex | None = None,
     jackknife_parts: SupportsIndex | None = None,
 ) -> LogCalibration:
@@ -3433,6 +3445,9 @@ def calibrate(
     estimate_centre
         Whether an error of the bearings that goes once round the camera is estimated too: what another image centre
         makes, or a camera that leans. Default: False.
+    estimate_rolling_shutter
+        Whether it is estimated too by how much lines are seen later on one side of the camera than on the other, as
+        through a rolling shutter. Default: False.
     max_iterations
         Most linearisations of each of the two descents (robust, then without outliers). Default: 100.
     jackknife_parts

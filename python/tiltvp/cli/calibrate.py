@@ -144,13 +144,14 @@ def _calibrated(
         return calibrate_log(
             log.odometry, log.bearings, times_s=log.times_s,
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
+            estimate_rolling_shutter=read.estimate_rolling_shutter,
             **{"estimate_centre": read.estimate_centre} | noise() | options | drive.of_whole_log(),
         )  # fmt: skip
 
     log, whole, doubt, remedies, left_out = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
-        # The filter does not estimate the image centre.
+        # The filter estimates neither the image centre nor a rolling shutter.
         history = calibrator.follow(log.odometry, log.about_centre(whole.centre_off_rad).bearings)
     with watching.viewer() as viewer:
         if viewer is not None:

@@ -47,7 +47,14 @@ _WIDEST_M: Final = 10.0
 @from_library(
     {"SelfCalibrator": CALIBRATION_METHODS, "calibrate": ()},
     words={"odometry_k_m": "--odometry-k", "step_sigma_m": "--step-sigma", "start_distance_m": "--start-distance"},
-    but=("wheel_base_m", "method", "estimate_odometry", "estimate_time_offset", "estimate_centre"),
+    but=(
+        "wheel_base_m",
+        "method",
+        "estimate_odometry",
+        "estimate_time_offset",
+        "estimate_centre",
+        "estimate_rolling_shutter",
+    ),
 )
 class DriveOptions(LibraryOptions):
     """The robot, the mounting as it is thought to be, and how sure measurements are."""
@@ -119,6 +126,8 @@ class LogOptions:
     estimate_centre: Switch = False
     """From each whole log also how far the image centre is off, which a camera that leans looks like. From pictures
     with lines all round it always is."""
+    estimate_rolling_shutter: Switch = False
+    """From each whole log also by how much lines are seen later on one side of the camera than on the other."""
 
 
 class Solved(NamedTuple):

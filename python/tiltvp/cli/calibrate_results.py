@@ -272,6 +272,10 @@ def _show(one: Calibration, *, several: bool) -> None:
         both = np.degrees([whole.centre_off_rad, whole.centre_off_sigma_rad]).T
         forward, left = (f"{off:.3f} +- {sigma:.3f}" for off, sigma in both)
         say(f"image centre: off by {forward} degrees of a bearing forward in the camera, by {left} to its left")
+    if whole.rolling_shutter_sigma_s[0] > 0.0:
+        both = np.transpose([whole.rolling_shutter_s, whole.rolling_shutter_sigma_s])
+        forward, left = (f"{late:.4f} +- {sigma:.4f}" for late, sigma in both)
+        say(f"rolling shutter: lines forward in the camera are seen {forward} s late, those to its left {left} s")
     if one.late_s and one.frames_late_s is not None:
         say(f"frames are stamped {one.frames_late_s:.4f} +- {whole.time_offset_sigma_s:.4f} s late in all")
 

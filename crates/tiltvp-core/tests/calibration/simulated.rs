@@ -44,6 +44,8 @@ pub(crate) struct Errors {
     pub(crate) centre: [f64; 2],
     /// By how much the camera turns all along the drive, so that it is where it should be at the end.
     pub(crate) creep_rad: f64,
+    /// How much later than in the middle of the image posts are seen forward and left in the camera, seconds.
+    pub(crate) shutter_s: [f64; 2],
 }
 
 pub(crate) const NONE: Errors = Errors {
@@ -55,6 +57,7 @@ pub(crate) const NONE: Errors = Errors {
     carpet: 0.0,
     centre: [0.0; 2],
     creep_rad: 0.0,
+    shutter_s: [0.0; 2],
 };
 
 /// What is read on a drive.
@@ -96,20 +99,24 @@ pub(crate) fn drive(seed: u32, errors: Errors) -> Drive {
         let middle = heading + 0.5 * turn;
         place += Vector2::new(middle.cos(), middle.sin()) * distance;
         heading += turn;
-        // Where the robot is when the bearings are taken that are said to be of now.
-        let then = errors.late_s / STEP_S;
-        let turn = if then > 0.0 { turn_in(step + 1) } else { turn };
-        let middle = heading + 0.5 * turn * then;
-        let (place, heading) =
-            (place + Vector2::new(middle.cos(), middle.sin()) * (distance * then), heading + turn * then);
         let pushed = if step >= STEPS / 2 { errors.bump_m } else { 0.0 };
-        let (sin, cos) = heading.sin_cos();
-        let (x, y) = (TRUTH.x_m + pushed, TRUTH.y_m);
-        let camera = place + Vector2::new(cos * x - sin * y, sin * x + cos * y);
+        // Where a post is seen when bearings are taken that are said to be of now.
+        let seen_at = |late_s: f64, post: Vector2<f64>| {
+            let then = late_s / STEP_S;
+            let turn = if then > 0.0 { turn_in(step + 1) } else { turn };
+            let middle = heading + 0.5 * turn * then;
+            let place = place + Vector2::new(middle.cos(), middle.sin()) * (distance * then);
+            let heading = heading + turn * then;
+            let (sin, cos) = heading.sin_cos();
+            let (x, y) = (TRUTH.x_m + pushed, TRUTH.y_m);
+            let ray = post - place - Vector2::new(cos * x - sin * y, sin * x + cos * y);
+            (ray.y.atan2(ray.x) - heading - TRUTH.yaw_rad).sin_cos()
+        };
         for (post, off) in off.iter_mut().enumerate() {
             *off = errors.kept * *off + (1.0 - errors.kept * errors.kept).sqrt() * SIGMA_RAD * normal(&mut rng);
-            let ray = posts[post] - camera;
-            let (sin, cos) = (ray.y.atan2(ray.x) - heading - TRUTH.yaw_rad).sin_cos();
+            let (sin, cos) = seen_at(errors.late_s, posts[post]);
+            let late_s = errors.late_s + errors.shutter_s[0] * cos + errors.shutter_s[1] * sin;
+            let (sin, cos) = seen_at(late_s, posts[post]);
             let seen = (sin - errors.centre[1]).atan2(cos - errors.centre[0]);
             let yet_to_turn = errors.creep_rad * (1.0 - step as f64 / (STEPS - 1) as f64);
             let bearing_rad = wrap_angle(seen + *off + yet_to_turn);

@@ -36,6 +36,37 @@ fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
     }
 }
 
+/// Through a shutter that takes 30 or 45 ms from posts on one side of the camera to those on the other, by winding and by abrupt turns.
+#[test]
+fn a_rolling_shutter_is_named_and_found_with_the_mounting() {
+    let options = LogOptions { estimate_rolling_shutter: true, ..options() };
+    let alone = ConsistencyBand::of_mean(0.9999, 1, DRIVES).unwrap();
+    for (turns, shutter_s) in [
+        (Turns::Winding, [0.0, 0.0]),
+        (Turns::Winding, [0.009, -0.012]),
+        (Turns::Abrupt, [0.0, 0.0]),
+        (Turns::Abrupt, [-0.0225, 0.0]),
+    ] {
+        let drives: Vec<Drive> = (0..DRIVES).map(|seed| drive(seed, Errors { turns, shutter_s, ..NONE })).collect();
+        let is_named = |drive: &&Drive| {
+            whole(drive, &self::options()).estimate.suspect.is_some_and(|suspect| suspect.cause == Cause::Shutter)
+        };
+        let named = drives.iter().filter(is_named).count();
+        assert!(if shutter_s == [0.0; 2] { named <= 1 } else { named >= 19 }, "{named}");
+        let found: Vec<LogCalibration> = drives.iter().map(|drive| whole(drive, &options)).collect();
+        let square = |found: &LogCalibration, k: usize| {
+            ((found.rolling_shutter_s[k] - shutter_s[k]) / found.rolling_shutter_sigma_s[k]).powi(2)
+        };
+        let squares = [0, 1].map(|k| mean(found.iter().map(|found| square(found, k))));
+        let nees = mean(found.iter().map(|found| nees(&found.estimate)));
+        println!(
+            "a rolling shutter of {shutter_s:?} s, {turns:?}: mean squared errors in stated sigmas {squares:.2?}, NEES of the mounting {nees:.2} of 3"
+        );
+        assert!(squares.iter().all(|square| alone.holds(*square)) && band().holds(nees), "{squares:?}, {nees}");
+        assert_relied_upon(&found);
+    }
+}
+
 /// The mounting that is told is the one at the end, which is neither that of most of the drive nor stated to be. Some motions look noisier
 /// than told meanwhile, which is named then.
 #[test]

@@ -34,6 +34,12 @@ value! {
         centre_off_rad: Vector2<f64>,
         /// Fresh (2,) float64: standard deviations of it; 0 where it was not estimated.
         centre_off_sigma_rad: Vector2<f64>,
+        /// Fresh (2,) float64: how much later than in the middle of the image lines along bearings 0 and 90 degrees are seen, as through
+        /// a rolling shutter: seconds, in a log without times steps; 0 where it was not estimated. Others by the cosine of their bearing
+        /// of the one and the sine of the other.
+        rolling_shutter_s: Vector2<f64>,
+        /// Fresh (2,) float64: standard deviations of it; 0 where it was not estimated.
+        rolling_shutter_sigma_s: Vector2<f64>,
         /// Bearings that were used; of those taken at a standstill only the first.
         bearings: usize,
         /// Bearings farther off than 4.5 standard deviations, which count for nothing.
@@ -67,6 +73,8 @@ value! {
         time_offset_sigma_s,
         centre_off_rad,
         centre_off_sigma_rad,
+        rolling_shutter_s,
+        rolling_shutter_sigma_s,
         bearings,
         outliers,
         residual_rms,

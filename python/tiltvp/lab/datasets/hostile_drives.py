@@ -48,6 +48,8 @@ class HostileDrive:
     options: dict[str, Any]
     truth: Table
     bound: Table
+    asked: dict[str, bool] = field(default_factory=dict)
+    """What else the whole log is asked for."""
 
 
 @dataclass
@@ -68,6 +70,7 @@ class _Case:
     kinds: tuple[str, ...] = ("paper", "alternating")
     noise: dict[str, Any] = field(default_factory=dict)
     told: dict[str, float] = field(default_factory=dict)
+    asked: dict[str, bool] = field(default_factory=dict)
 
 
 def _wheels(left: float, right: float, *, swapped: bool = False) -> _Case:
@@ -149,7 +152,7 @@ def _off_centre(off_px: float) -> _Case:
     return _Case(harm)
 
 
-def _rolling(readout_s: float) -> _Case:
+def _rolling(readout_s: float, **asked: bool) -> _Case:
     """Rows of an image are read one after another, in so many seconds: a line in one is seen later than in another.
     Which way rows run is another for each drive."""
 
@@ -161,7 +164,7 @@ def _rolling(readout_s: float) -> _Case:
             if (other := seen.get((step + (1 if late > 0.0 else -1), landmark))) is not None:
                 row[2] += abs(late) * math.remainder(other - row[2], math.tau)
 
-    return _Case(harm)
+    return _Case(harm, asked=asked)
 
 
 def _carpet(log: _Log) -> None:
@@ -204,6 +207,7 @@ DRIVE_CASES: Final = {
     "image centre off by 1 px": _off_centre(1.0),
     "image centre off by 2 px": _off_centre(2.0),
     "rows read in 30 ms": _rolling(0.03),
+    "rows read in 30 ms, estimated": _rolling(0.03, estimate_rolling_shutter=True),
     "wheels slip": _Case(_slips),
     "carpet": _Case(_carpet),
     "straight on only": _Case(kinds=("straight",)),
@@ -227,7 +231,7 @@ def hostile_drives(case: str, seeds: range) -> Iterator[HostileDrive]:
         made.harm(log)
         bound = drive.cramer_rao_bound(start_sigma=START_SIGMA)
         options = log.options | made.told
-        yield HostileDrive(case, seed, log.odometry, log.bearings, options, log.mounting, bound)
+        yield HostileDrive(case, seed, log.odometry, log.bearings, options, log.mounting, bound, made.asked)
 
 
 def harmed_odometry(case: str, odometry: Table, rng: np.random.Generator) -> Table:

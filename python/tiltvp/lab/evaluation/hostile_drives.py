@@ -83,7 +83,7 @@ def summarise_drive_cases(table: pl.DataFrame) -> pl.DataFrame:
 
 def _whole_log(item: HostileDrive) -> dict[str, Any]:
     try:
-        whole = calibrate(item.odometry, item.bearings, **item.options)
+        whole = calibrate(item.odometry, item.bearings, **item.options, **item.asked)
     except InvalidInputError as error:
         return judged_refusal(item, "whole log", error)
     return judged(item, "whole log", whole, whole.mounting)
@@ -129,8 +129,12 @@ def _is_estimated(item: HostileDrive, verdict: LogCalibration | MountingEstimate
     """Whether the cause is something that the whole log estimates, which need not be named."""
     if not isinstance(verdict, LogCalibration):
         return False
-    if cause == "image centre":
-        off, sigma = verdict.centre_off_rad, verdict.centre_off_sigma_rad
+    of_camera = {
+        "image centre": (verdict.centre_off_rad, verdict.centre_off_sigma_rad),
+        "rolling shutter": (verdict.rolling_shutter_s, verdict.rolling_shutter_sigma_s),
+    }
+    if cause in of_camera:
+        off, sigma = of_camera[cause]
         return bool(np.hypot(*off) > SURELY * np.hypot(*sigma))
     told = SelfCalibrator(**item.options).options
     own = {"bearing_sigma_rad": verdict.bearing_sigma_rad, "odometry_k_m": verdict.odometry_k_m}

@@ -9,7 +9,7 @@ pub(crate) struct FreeParameters {
     pub(crate) offset: bool,
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) centre: bool,
-    /// How much later lines are seen on one side of the camera than on the other; looked for, not estimated.
+    /// How much later lines are seen on one side of the camera than on the other.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) shutter: bool,
     /// By how much the camera turned all along the drive, up to the last keyframe; looked for, not estimated.

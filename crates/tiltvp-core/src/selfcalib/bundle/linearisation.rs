@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
 use super::motion_residual::MotionResidual;
 use super::problem::BundleProblem;
-use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between_jacobians};
+use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, between_jacobians};
 
 /// Normal equations: `information step = rhs`.
 pub(crate) struct NormalEquations {
@@ -122,12 +122,10 @@ impl BundleProblem {
         points: &[HomogeneousLandmark],
         mut each: impl FnMut(&BearingRow),
     ) {
-        let (pose, by) = self.observation_pose(at);
-        let view = Viewpoint::new(&pose, &self.mounting);
         let calibration_width = self.free.width();
         // The mounting is that at the last keyframe.
         let yet_to_creep = at as f64 / (self.keyframes.len() - 1).max(1) as f64 - 1.0;
-        for observation in &self.keyframes[at].observations {
+        self.for_each_observation(at, |observation, view, by| {
             let point = &points[observation.landmark];
             let p = view.jacobians(point);
             let s = 1.0 / (self.bearing_sigma * self.scatters[observation.landmark]);
@@ -135,14 +133,14 @@ impl BundleProblem {
             let mut by_calibration = [0.0; 11];
             by_calibration[..3].copy_from_slice((p.by_mounting * s).as_slice());
             let (mut by_pose, mut by_neighbour) = (p.by_pose * s, Vector3::zeros());
-            if let Some(by) = &by {
-                let by_time = by_pose.dot(&by.offset);
+            if let Some(by) = by {
                 if self.free.offset {
-                    by_calibration[self.free.offset_at()] = by_time;
+                    by_calibration[self.free.offset_at()] = by_pose.dot(&by.offset);
                 }
                 if self.free.shutter {
                     let at = self.free.shutter_at();
-                    by_calibration[at..at + 2].copy_from_slice((observation.along * by_time).as_slice());
+                    let by_shutter = observation.along * by_pose.dot(&by.shutter);
+                    by_calibration[at..at + 2].copy_from_slice(by_shutter.as_slice());
                 }
                 by_neighbour = by.neighbour.transpose() * by_pose;
                 by_pose = by.pose.transpose() * by_pose;
@@ -163,6 +161,6 @@ impl BundleProblem {
                 residual,
                 weight: self.loss.weight(residual),
             });
-        }
+        });
     }
 }

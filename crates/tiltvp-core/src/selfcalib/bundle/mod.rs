@@ -11,6 +11,7 @@ mod landmark_distance;
 mod linearisation;
 mod link;
 mod motion_residual;
+mod observation_pose;
 mod pose_elimination;
 mod problem;
 mod random_signs;

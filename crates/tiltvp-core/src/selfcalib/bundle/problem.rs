@@ -5,13 +5,12 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use super::free_parameters::FreeParameters;
 use super::keyframe::{Keyframe, Observation};
 use crate::selfcalib::model::{
-    BearingLoss, FitSummary, InverseDistanceLandmark, MotionLoss, MotionNoise, Viewpoint, Wheels, along_arc, arc,
-    between, between_jacobians, compose, compose_jacobians, preintegrate,
+    BearingLoss, FitSummary, InverseDistanceLandmark, MotionLoss, MotionNoise, Wheels, preintegrate,
 };
 use crate::selfcalib::options::SelfCalibratorOptions;
 
-/// A chain of keyframes from a fixed first one, and the parameters that they share: mounting, wheels, time offset and
-/// image centre if free, then landmarks.
+/// A chain of keyframes from a fixed first one, and the parameters that they share: mounting, wheels, time offset, image
+/// centre and rolling shutter if free, then landmarks.
 ///
 /// The cost is half the sum of the squared, whitened residuals of odometry and bearings (with robust losses) and of the prior.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +23,9 @@ pub(crate) struct BundleProblem {
     /// lines are seen.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) centre: Vector2<f64>,
+    /// How much later than in the middle of the image lines are seen forward and left in the camera, seconds.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) shutter_s: Vector2<f64>,
     /// Whether the time offset is that of late bearings, which were taken on the way to the next keyframe; else on that from the one before.
     /// It does not change with the offset's sign in a descent, for which the cost would have a kink at zero.
     pub(crate) late: bool,
@@ -58,16 +60,6 @@ const OFFSET_SIGMA_S: f64 = 1.0;
 const CENTRE_SIGMA: f64 = 0.1;
 const CREEP_SIGMA_RAD: f64 = 0.2;
 
-/// Jacobians of the pose of an observation.
-pub(crate) struct ObservationPoseJacobians {
-    /// By the pose of its keyframe.
-    pub(crate) pose: Matrix3<f64>,
-    /// By that of the keyframe's [neighbour](BundleProblem::neighbour).
-    pub(crate) neighbour: Matrix3<f64>,
-    /// By the time offset.
-    pub(crate) offset: Vector3<f64>,
-}
-
 impl BundleProblem {
     /// A problem without motions and landmarks, with the prior of the options, at a guess of the mounting.
     pub(crate) fn new(
@@ -76,46 +68,28 @@ impl BundleProblem {
         free: FreeParameters,
         loss: BearingLoss,
     ) -> Self {
-        let width = free.width();
-        let mut prior_mean = DVector::zeros(width);
-        let mut prior_information = DMatrix::zeros(width, width);
-        prior_mean.fixed_rows_mut::<3>(0).copy_from(&options.start.vector());
         let start = options.start_covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
-        prior_information.fixed_view_mut::<3, 3>(0, 0).copy_from(&start);
-        if free.wheels {
-            prior_mean[4] = options.wheel_base_m.ln();
-            for (k, sigma) in WHEELS_SIGMA.iter().enumerate() {
-                prior_information[(3 + k, 3 + k)] = 1.0 / (sigma * sigma);
-            }
-        }
-        if free.offset {
-            let at = free.offset_at();
-            prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
-        }
-        if free.centre {
-            for k in 0..2 {
-                prior_information[(free.centre_at() + k, free.centre_at() + k)] = 1.0 / (CENTRE_SIGMA * CENTRE_SIGMA);
-            }
-        }
-        Self {
+        let mounting_alone = Self {
             mounting: *mounting,
             wheels: Wheels::new(options.wheel_base_m),
             offset_s: 0.0,
             centre: Vector2::zeros(),
+            shutter_s: Vector2::zeros(),
             late: false,
             as_wheels_read: false,
             turns_as_read: false,
-            free,
+            free: FreeParameters::default(),
             noise: options.motion_noise(),
             landmarks: Vec::new(),
             keyframes: vec![Keyframe::anchor()],
-            prior_mean,
-            prior_information,
+            prior_mean: options.start.vector().as_slice().to_vec().into(),
+            prior_information: DMatrix::from_column_slice(3, 3, start.as_slice()),
             bearing_sigma: options.bearing_sigma_rad,
             scatters: Vec::new(),
             loss,
             slip: MotionLoss::Logarithmic,
-        }
+        };
+        mounting_alone.with_free(free)
     }
 
     /// The number of shared parameters.
@@ -136,6 +110,9 @@ impl BundleProblem {
         }
         if self.free.centre {
             g.fixed_rows_mut::<2>(self.free.centre_at()).copy_from(&self.centre);
+        }
+        if self.free.shutter {
+            g.fixed_rows_mut::<2>(self.free.shutter_at()).copy_from(&self.shutter_s);
         }
         for (i, landmark) in self.landmarks.iter().enumerate() {
             let at = self.free.width() + 2 * i;
@@ -175,7 +152,8 @@ impl BundleProblem {
             problem.free.centre = true;
         }
         if free.shutter && !problem.free.shutter {
-            insert(problem.free.shutter_at(), &[(0.0, OFFSET_SIGMA_S); 2]);
+            let [x, y] = problem.shutter_s.into();
+            insert(problem.free.shutter_at(), &[(x, OFFSET_SIGMA_S), (y, OFFSET_SIGMA_S)]);
             problem.free.shutter = true;
         }
         if free.creep && !problem.free.creep {
@@ -213,6 +191,9 @@ impl BundleProblem {
         }
         if self.free.centre {
             self.centre = g.fixed_rows::<2>(self.free.centre_at()).into();
+        }
+        if self.free.shutter {
+            self.shutter_s = g.fixed_rows::<2>(self.free.shutter_at()).into();
         }
         for (i, landmark) in self.landmarks.iter_mut().enumerate() {
             let at = self.free.width() + 2 * i;
@@ -269,65 +250,6 @@ impl BundleProblem {
         problem
     }
 
-    /// The keyframe towards which the robot was from another one when the bearings of that were taken: the next where they are late, else
-    /// the one before. None where there is none, where velocities are the wheels', and without a time offset.
-    pub(crate) fn neighbour(&self, at: usize) -> Option<usize> {
-        if self.as_wheels_read || !self.free.offset && self.offset_s == 0.0 {
-            None
-        } else if self.late {
-            Some(at + 1).filter(|next| *next < self.keyframes.len())
-        } else {
-            at.checked_sub(1)
-        }
-    }
-
-    /// The pose at which the bearings of a keyframe were taken, with its Jacobians unless the time offset is zero and fixed: on the arc to
-    /// its [neighbour](Self::neighbour), or without one on that of the wheels.
-    pub(crate) fn observation_pose(&self, at: usize) -> (Vector3<f64>, Option<ObservationPoseJacobians>) {
-        let (keyframe, tau) = (&self.keyframes[at], self.offset_s);
-        if !self.free.offset && tau == 0.0 {
-            return (keyframe.pose, None);
-        }
-        let (velocity, by_poses) = match self.neighbour(at) {
-            Some(other) => self.velocity_between(at, other),
-            None => (self.velocity_read(at), [Matrix3::zeros(); 2]),
-        };
-        let (moved, by_along) = arc(&(velocity * tau));
-        let (first, second) = compose_jacobians(&keyframe.pose, &moved);
-        let by_velocity = second * by_along * tau;
-        let jacobians = ObservationPoseJacobians {
-            pose: first + by_velocity * by_poses[0],
-            neighbour: by_velocity * by_poses[1],
-            offset: second * by_along * velocity,
-        };
-        (compose(&keyframe.pose, &moved), Some(jacobians))
-    }
-
-    /// The velocity at a keyframe as the wheels read it: on departure where bearings are late, if it goes on, else on arrival.
-    fn velocity_read(&self, at: usize) -> Vector3<f64> {
-        match self.keyframes.get(at + 1).filter(|_| self.late) {
-            Some(next) => next.mean_velocity() + next.unevenness[0],
-            None => self.keyframes[at].mean_velocity() + self.keyframes[at].unevenness[1],
-        }
-    }
-
-    /// The velocity at a keyframe on the way to or from a neighbour, with its Jacobians by the poses of both.
-    fn velocity_between(&self, at: usize, neighbour: usize) -> (Vector3<f64>, [Matrix3<f64>; 2]) {
-        let (start, end) = (&self.keyframes[at.min(neighbour)], &self.keyframes[at.max(neighbour)]);
-        let motion = between(&start.pose, &end.pose);
-        let ((along, by_motion), (by_start, by_end)) = (along_arc(&motion), between_jacobians(&start.pose, &motion));
-        if end.seconds <= 0.0 {
-            return (Vector3::zeros(), [Matrix3::zeros(); 2]);
-        }
-        let [by_start, by_end] = [by_start, by_end].map(|by_pose| by_motion * by_pose / end.seconds);
-        let mean = along / end.seconds;
-        if at < neighbour {
-            (mean + end.unevenness[0], [by_start, by_end])
-        } else {
-            (mean + end.unevenness[1], [by_end, by_start])
-        }
-    }
-
     /// Half the sum of the squared, whitened residuals.
     pub(crate) fn cost(&self) -> f64 {
         self.fit().cost
@@ -348,39 +270,12 @@ impl BundleProblem {
     /// The whitened residuals of all bearings, in the order of keyframes and observations.
     pub(crate) fn residuals(&self) -> Vec<f64> {
         let (points, mut all) = (self.homogeneous_landmarks(), Vec::new());
-        for (at, keyframe) in self.keyframes.iter().enumerate() {
-            let view = Viewpoint::new(&self.observation_pose(at).0, &self.mounting);
-            let residual = |seen: &Observation| view.residual(&points[seen.landmark], &seen.about(&self.centre).along);
-            all.extend(
-                keyframe.observations.iter().map(|s| residual(s) / (self.bearing_sigma * self.scatters[s.landmark])),
-            );
+        for at in 0..self.keyframes.len() {
+            self.for_each_observation(at, |seen, view, _| {
+                let residual = view.residual(&points[seen.landmark], &seen.about(&self.centre).along);
+                all.push(residual / (self.bearing_sigma * self.scatters[seen.landmark]));
+            });
         }
         all
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::selfcalib::model::{RelativeMotion, WheelMotion};
-
-    /// Between two keyframes the robot drives slowly, then three times as fast, straight on.
-    #[test]
-    fn velocities_as_read_are_those_of_the_first_and_the_last_reading() {
-        let options = SelfCalibratorOptions::default();
-        let free = FreeParameters::default();
-        let mut problem = BundleProblem::new(&options, &Vector3::zeros(), free, BearingLoss::Truncated(4.5));
-        let driven = |way_m: f64| {
-            let wheels = WheelMotion { left_m: way_m, right_m: way_m };
-            RelativeMotion::from_wheels(&wheels, &problem.wheels, &problem.noise)
-        };
-        let (slow, fast) = (driven(0.1), driven(0.3));
-        let mut keyframe = Keyframe::after(slow, Vector3::new(0.1, 0.0, 0.0), 1.0);
-        keyframe.extend(&fast, Vector3::new(0.4, 0.0, 0.0), 1.0);
-        problem.keyframes.push(keyframe);
-        for (late, at, expected) in [(false, 1, 0.3), (true, 0, 0.1)] {
-            problem.late = late;
-            assert!((problem.velocity_read(at) - Vector3::new(expected, 0.0, 0.0)).norm() < 1e-12, "{late}");
-        }
     }
 }

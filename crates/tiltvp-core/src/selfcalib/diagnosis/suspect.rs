@@ -122,7 +122,7 @@ impl fmt::Display for Suspect {
             ),
             Cause::Shutter => write!(
                 f,
-                "lines seem to be seen {value:.3} steps (seconds, with times) later on one side of the camera than on the other, as through a rolling shutter: drive more slowly"
+                "lines seem to be seen {value:.3} steps (seconds, with times) later on one side of the camera than on the other, as through a rolling shutter: try estimate_rolling_shutter, or drive more slowly"
             ),
             Cause::Creep => write!(
                 f,

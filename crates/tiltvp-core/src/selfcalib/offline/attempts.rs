@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::descent::{TOLERANCE, solve};
 use super::incremental::{NamedProblem, incremental_problem, problem_along};
-use super::log::SortedLog;
+use super::log::{LogOptions, SortedLog};
 use crate::error::Result;
 use crate::selfcalib::bundle::{BundleProblem, DescentReport, FIRST_DAMPING, FreeParameters};
 use crate::selfcalib::model::{OUTLIER_SIGMAS, Wheels};
@@ -55,7 +55,21 @@ pub(super) fn solved(log: &SortedLog<'_>) -> Result<Option<(NamedProblem, Descen
             break;
         }
     }
-    Ok(best)
+    Ok(best.map(|(named, descent)| with_rolling_shutter(named, descent, options)))
+}
+
+/// A solution with the rolling shutter free where the options ask for it.
+fn with_rolling_shutter(
+    mut named: NamedProblem,
+    solved: DescentReport,
+    options: &LogOptions,
+) -> (NamedProblem, DescentReport) {
+    if !options.estimate_rolling_shutter {
+        return (named, solved);
+    }
+    named.problem = named.problem.with_free(FreeParameters { shutter: true, ..named.problem.free });
+    let descent = solve(&mut named.problem, options.max_iterations);
+    (named, descent)
 }
 
 /// The problem that an attempt starts from, with the parameters free that the options ask for.
@@ -65,6 +79,7 @@ pub(super) fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProb
         wheels: options.estimate_odometry,
         offset: options.estimate_time_offset,
         centre: options.estimate_centre,
+        // Freed once the rest is solved: of a few keyframes it explains anything.
         shutter: false,
         creep: false,
     };

@@ -32,6 +32,9 @@ options! {
         /// Whether an error of the bearings that goes once round the camera is estimated too: what another image centre makes, or a
         /// camera that leans.
         estimate_centre: bool = false;
+        /// Whether it is estimated too by how much lines are seen later on one side of the camera than on the other, as through a
+        /// rolling shutter.
+        estimate_rolling_shutter: bool = false;
         /// Most linearisations of each of the two descents (robust, then without outliers).
         max_iterations: u32 = 100;
         /// Parts of the landmarks that are left out in turn: the covariance of the mounting is then no less than the scatter of

@@ -120,7 +120,7 @@ fn bearings(problem: &BundleProblem, landmark: usize, such: impl Fn(f64) -> bool
     let point = problem.landmarks[landmark].homogeneous();
     for (at, keyframe) in problem.keyframes.iter().enumerate() {
         let Some(seen) = keyframe.observations.iter().find(|seen| seen.landmark == landmark) else { continue };
-        let view = Viewpoint::new(&problem.observation_pose(at).0, &problem.mounting);
+        let view = Viewpoint::new(&problem.observation_pose(at, &seen.along).0, &problem.mounting);
         let residual = view.residual(&point, &seen.about(&problem.centre).along);
         if such(residual.abs() / (problem.bearing_sigma * problem.scatters[landmark])) {
             found.push((at, seen.bearing));
@@ -137,8 +137,8 @@ fn assign(problem: &mut BundleProblem, pair: [usize; 2]) -> bool {
         let Some(k) = problem.keyframes[at].observations.iter().position(|seen| pair.contains(&seen.landmark)) else {
             continue;
         };
-        let view = Viewpoint::new(&problem.observation_pose(at).0, &problem.mounting);
         let seen = problem.keyframes[at].observations[k];
+        let view = Viewpoint::new(&problem.observation_pose(at, &seen.along).0, &problem.mounting);
         let [first, second] = places.map(|place| view.residual(&place, &seen.about(&problem.centre).along).abs());
         let nearer = pair[usize::from(second < first)];
         changed |= nearer != seen.landmark;

@@ -1,5 +1,7 @@
 //! A landmark from its bearings, at poses that are known roughly.
 
+use nalgebra::{Vector2, Vector3};
+
 use crate::geometry::wrap_angle;
 use crate::selfcalib::bundle::{BundleProblem, DISTANCE_STEP, DISTANCE_STEPS};
 use crate::selfcalib::model::{InverseDistanceLandmark, camera_position, landmark_from_bearing, predict};
@@ -15,15 +17,17 @@ pub(super) fn triangulated(
     filter: &SelfCalibratorOptions,
     seen: &[(usize, f64)],
 ) -> (InverseDistanceLandmark, f64) {
-    let pose = |keyframe: usize| problem.observation_pose(keyframe).0;
-    let (first, bearing) = seen[0];
-    let first = pose(first);
+    let pose = |(keyframe, bearing): &(usize, f64)| {
+        problem.observation_pose(*keyframe, &Vector2::new(bearing.cos(), bearing.sin())).0
+    };
+    let poses: Vec<Vector3<f64>> = seen.iter().map(pose).collect();
+    let (first, bearing) = (poses[0], seen[0].1);
     let anchor = camera_position(&first, &problem.mounting);
     let off = |landmark: &InverseDistanceLandmark| {
-        let one = |(keyframe, bearing): &(usize, f64)| {
-            wrap_angle(predict(&pose(*keyframe), &problem.mounting, landmark).bearing - bearing).abs()
+        let one = |(pose, (_, bearing)): (&Vector3<f64>, &(usize, f64))| {
+            wrap_angle(predict(pose, &problem.mounting, landmark).bearing - bearing).abs()
         };
-        seen.iter().map(one).sum::<f64>() / seen.len() as f64
+        poses.iter().zip(seen).map(one).sum::<f64>() / seen.len() as f64
     };
     let at = |inverse: f64| landmark_from_bearing(anchor, inverse, &first, &problem.mounting, bearing);
     let direction = bearing + first.z + problem.mounting.z;

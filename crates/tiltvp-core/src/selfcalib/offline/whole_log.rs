@@ -34,6 +34,11 @@ pub struct LogCalibration {
     pub centre_off_rad: Vector2<f64>,
     /// Its standard deviations.
     pub centre_off_sigma_rad: Vector2<f64>,
+    /// How much later than in the middle of the image lines along bearings 0 and 90 degrees are seen, as through a rolling shutter: seconds,
+    /// in a log without times steps; 0 where not estimated. Others by the cosine of their bearing of the one and the sine of the other.
+    pub rolling_shutter_s: Vector2<f64>,
+    /// Its standard deviations.
+    pub rolling_shutter_sigma_s: Vector2<f64>,
     /// Bearings that were used. Of those of one landmark at a standstill only the first is.
     pub bearings: usize,
     /// Bearings farther from their prediction than 4.5 standard deviations, which have no weight.
@@ -229,6 +234,17 @@ fn solved_deviations(
     deviations
 }
 
+/// The scatter of what the log tells of the mounting without some of its landmarks in turn, where it is asked for. Of what one part alone
+/// tells no more is known than at the start.
+fn landmark_scatter(options: &LogOptions, problem: &BundleProblem) -> Option<Matrix3<f64>> {
+    let solve_part = |part: &mut BundleProblem| {
+        let descent = solve(part, options.max_iterations);
+        solve_without_slips(part, options.max_iterations).unwrap_or(descent)
+    };
+    let parts = options.jackknife_parts as usize;
+    (parts > 0).then(|| problem.landmark_scatter(parts, solve_part).unwrap_or(options.filter.start_covariance))
+}
+
 /// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed. What is suspect is told by the
 /// solution that slips pull: they may be what a delay makes of turns.
 fn report(
@@ -268,15 +284,7 @@ fn report(
     let own = widening * mounting * widening.transpose();
     let doubted = if converged { problem.doubted_parts() } else { None };
     let motions = doubted.as_ref().map(DoubtedParts::scatter_of_mounting);
-    let landmarks = (converged && options.jackknife_parts > 0).then(|| {
-        let parts = options.jackknife_parts as usize;
-        // Of what one part alone tells no more is known than at the start.
-        let solve_part = |part: &mut BundleProblem| {
-            let descent = solve(part, options.max_iterations);
-            solve_without_slips(part, options.max_iterations).unwrap_or(descent)
-        };
-        problem.landmark_scatter(parts, solve_part).unwrap_or(o.start_covariance)
-    });
+    let landmarks = converged.then(|| landmark_scatter(options, &problem)).flatten();
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let (counts, by_landmarks) = (pulled.contradictions(), with(landmarks.as_ref(), own));
     let factors = pulled.noise_factors();
@@ -292,6 +300,7 @@ fn report(
         covariance[(at, at)].max(by_motions).sqrt()
     };
     let free = problem.free;
+    let sigmas = |is_free, at| Vector2::from_fn(|k, _| if is_free { sigma(at + k) } else { 0.0 });
     Ok(LogCalibration {
         estimate: MountingEstimate::new(
             Mounting::from_vector(&problem.mounting),
@@ -307,7 +316,9 @@ fn report(
         time_offset_s: problem.offset_s,
         time_offset_sigma_s: if free.offset { sigma(free.offset_at()) } else { 0.0 },
         centre_off_rad: problem.centre,
-        centre_off_sigma_rad: Vector2::from_fn(|k, _| if free.centre { sigma(free.centre_at() + k) } else { 0.0 }),
+        centre_off_sigma_rad: sigmas(free.centre, free.centre_at()),
+        rolling_shutter_s: problem.shutter_s,
+        rolling_shutter_sigma_s: sigmas(free.shutter, free.shutter_at()),
         bearings: residuals.len(),
         outliers: residuals.len() - kept.len(),
         residual_rms: (sum / kept.len().max(1) as f64).sqrt(),

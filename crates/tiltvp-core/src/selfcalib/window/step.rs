@@ -84,13 +84,13 @@ impl SlidingWindow {
     /// a slip of the wheels.
     fn recheck_rejected(&mut self, rejected: &[usize], outcome: &mut StepOutcome) {
         let Some(keyframe) = self.problem.keyframes.last() else { return };
-        let (pose, _) = self.problem.observation_pose(self.problem.keyframes.len() - 1);
         if outcome.contradiction > 0.0 && self.problem.slipped(self.problem.keyframes.len() - 1) {
             (outcome.nis, outcome.used, outcome.rejected) = (outcome.contradiction, rejected.len(), 0);
             return;
         }
         for observation in keyframe.observations.iter().filter(|observation| rejected.contains(&observation.landmark)) {
             let landmark = &self.problem.landmarks[observation.landmark];
+            let (pose, _) = self.problem.observation_pose(self.problem.keyframes.len() - 1, &observation.along);
             let bearing = predict(&pose, &self.problem.mounting, landmark).bearing;
             let r = wrap_angle(bearing - observation.bearing) / self.problem.bearing_sigma;
             if r.abs() <= OUTLIER_SIGMAS {
