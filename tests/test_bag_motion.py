@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from recordings import START_S, Bag
+from recordings import KINDS, START_S, Bag
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams import Odometry, Wheels, frame_motions, open_frames, read_odometry
 
@@ -96,3 +96,21 @@ def test_wheels_that_stand_beside_velocities_of_theirs_are_no_robot_that_stands(
         told = r"/joint_states: angles of left_wheel that never change beside velocities of up to 2 m/s or rad/s"
         with pytest.raises(InvalidInputError, match=told):
             read_odometry(bag, wheels=Wheels(wheel_radius_m=0.1))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_clock_of_a_simulation_begins_at_0(kind: str, tmp_path: Path) -> None:
+    """Messages are written down by the clock of the wall; stamps of 0 before those of a wall's clock are none."""
+    for begins_s, at_zero in ((0.0, 1), (START_S, 3)):
+        made = Bag(kind)
+        for k in range(50):
+            stamp_s = 0.0 if k < at_zero else begins_s + 0.1 * k
+            made.odometry(stamp_s, 0.01 * k, 0.0, 0.0)
+            made.image("/image", stamp_s, np.zeros((4, 4), np.uint8), "mono8")
+        made.rows = [(row[0], row[1], START_S + 0.1 * (k // 2), row[3]) for k, row in enumerate(made.rows)]
+        folder = tmp_path / f"{begins_s:.0f}"
+        folder.mkdir()
+        bag = made.write(folder)
+        frames = open_frames(bag)
+        assert frames.times_s == pytest.approx(begins_s + 0.1 * np.arange(50))
+        assert [one is None for one in frame_motions(frames, bag).motions] == [False] * 50

@@ -67,9 +67,9 @@ class BagFrames(Frames):
         self._recording = recording
         self._topic = recording.choose(IMAGE_KINDS, option, topic)
         self.source, self.recording = str(recording.path), recording.path
-        times, self._bits = [], 0
+        times, self._bits, from_zero = [], 0, recording.is_from_zero(self._topic)
         for message in recording.messages(self._topic):
-            time_s, bits = _seen(message)
+            time_s, bits = _seen(message, from_zero=from_zero)
             times.append(time_s)
             self._bits = max(self._bits, bits)
         digits = len(str(max(len(times) - 1, 0)))
@@ -115,14 +115,14 @@ def _reading(name: str, message: Message, bits: int | None) -> Callable[[], NDAr
     return read
 
 
-def _seen(message: Message) -> tuple[float, int]:
+def _seen(message: Message, *, from_zero: bool) -> tuple[float, int]:
     """The time of an image, that of its writing where the message is damaged, and how many bits its values have.
 
     The bits are 0 where the encoding tells them.
     """
     try:
         content = message.decode()
-        time_s = message.stamp_s(content)
+        time_s = message.taken_s(content, from_zero=from_zero)
     except InvalidInputError:
         return message.time_s, 0
     try:

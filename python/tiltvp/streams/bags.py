@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, MissingExtraError, TiltvpError
 from tiltvp.images import LARGEST_IMAGE_BYTES
+from tiltvp.streams.odometry import GAP_MAX_S
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -21,6 +24,9 @@ BAG_ENDINGS: Final = (".bag", ".mcap", ".db3")
 _METADATA: Final = "metadata.yaml"
 MOST_METADATA_BYTES: Final = 16 << 20
 """Of a ROS 2 bag's metadata: some 300 bytes a topic and file, so that 10,000 topics of 1,000 files take 4 MB."""
+
+_AT_ZERO: Final = 20
+"""Messages of a topic that a simulation may have sent at its time 0: one, or some that it waited with."""
 
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
@@ -60,11 +66,13 @@ class Message:
         except Exception as error:
             raise InvalidInputError(f"a message that is no {_short(self.kind)} ({error})") from error
 
-    def stamp_s(self, content: Any) -> float:
-        """When it was taken, by its header; when it was written down where it has none."""
-        stamp = getattr(getattr(content, "header", None), "stamp", None)
-        seconds = 0.0 if stamp is None else stamp.sec + 1e-9 * stamp.nanosec
-        return float(seconds) if seconds > 0.0 else self.time_s
+    def taken_s(self, content: Any, *, from_zero: bool) -> float:
+        """When it was taken, by its header; when it was written down where it has none, or 0 in it, but that of a clock
+        `from_zero`."""
+        seconds = _stamp_s(content)
+        if seconds is None or seconds < 0.0 or (seconds == 0.0 and not from_zero):
+            return self.time_s
+        return seconds
 
 
 class Recording:
@@ -115,6 +123,20 @@ class Recording:
             for connection, time_ns, raw in reader.messages(connections):
                 yield Message(1e-9 * time_ns, raw, connection.msgtype, decode)
 
+    def is_from_zero(self, topic: Topic) -> bool:
+        """Whether its stamps begin at 0, as a simulation's: they go on before the time at which those of 0 were written
+        down. Else a stamp of 0 is none."""
+        written_s = -math.inf
+        for message in islice(self.messages(topic), _AT_ZERO):
+            try:
+                seconds = _stamp_s(message.decode())
+            except InvalidInputError:
+                continue
+            if seconds != 0.0:
+                return seconds is not None and seconds + GAP_MAX_S < written_s
+            written_s = message.time_s
+        return False
+
     def unread(self, topic: Topic, read: int) -> tuple[str, ...]:
         """A sentence where fewer messages of a topic were read than it has, as of a file that is damaged within."""
         told = f"{self.path}: {topic.name}: {topic.count - read} of {topic.count} messages cannot be read (damaged?)"
@@ -122,12 +144,13 @@ class Recording:
 
     def decoded(self, topic: Topic) -> Iterator[tuple[float, Any]]:
         """The time and the content of each message of a topic, which has no damaged ones."""
+        from_zero = self.is_from_zero(topic)
         for number, message in enumerate(self.messages(topic)):
             try:
                 content = message.decode()
             except InvalidInputError as error:
                 raise InvalidInputError(f"{self.path}: {topic.name}, message {number}: {error}") from error
-            yield message.stamp_s(content), content
+            yield message.taken_s(content, from_zero=from_zero), content
 
     @contextmanager
     def _opened(self) -> Iterator[AnyReader]:
@@ -163,6 +186,12 @@ class Recording:
             raise
         except (OSError, ValueError) as error:
             raise InvalidInputError(f"{str(self.path)!r}: cannot be read ({error}), expected a bag") from error
+
+
+def _stamp_s(content: Any) -> float | None:
+    """What a header tells, seconds; None where there is none."""
+    stamp = getattr(getattr(content, "header", None), "stamp", None)
+    return None if stamp is None else float(stamp.sec + 1e-9 * stamp.nanosec)
 
 
 def _short(kind: str) -> str:
