@@ -20,6 +20,7 @@ from tiltvp.setup_check import opposite_direction
 from tiltvp.streams import NamedImages, Odometry, Wheels, open_frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
+from tiltvp.turn_errors import turn_error
 from tiltvp.turning import small_camera, telling_frames, turn_axis
 
 pytestmark = pytest.mark.slow
@@ -214,6 +215,29 @@ def test_frames_and_motions_that_do_not_fit_are_refused(drive):
         find_setup(str(drive / "frames"), CAMERA)
     with pytest.raises(InvalidInputError, match="comes only once"):
         find_setup(NamedImages(), CAMERA)
+
+
+@pytest.mark.parametrize("verb", ["setup", "mount", "tilt", "level"])
+def test_turns_by_another_angle_than_the_odometry_tells_are_told(verb, drive, tmp_path, capsys):
+    """As by another wheel base, or frames of another clock: mountings were 10 degrees off, and filtered tilts 6."""
+    table = tmp_path / "odometry.csv"
+    for scale in (1.0, 1.5):
+        rows = "\n".join(f"{scale * STEP if k else 0.0},0.0" for k in range(COUNT))
+        table.write_text(f"yaw_rad,distance_m\n{rows}\n")
+        more = {"mount": [], "setup": ["--out", tmp_path / "robot.toml"]}.get(verb, ["--filter", "--out"])
+        more += {"tilt": [tmp_path / "tilts.csv"], "level": [tmp_path / "level"]}.get(verb, [])
+        code = run(verb, drive / "frames", "--camera", drive / "camera.toml", "--odometry", table, *more, "--overwrite")
+        said = capsys.readouterr().err
+        assert ("pairs of images turn otherwise than the odometry tells by 8 degrees" in said) == (scale != 1.0)
+        assert verb == "level" or code == (1 if verb == "setup" and scale != 1.0 else 0)
+
+
+def test_turns_of_frames_that_show_nothing_are_not_doubted():
+    noise = np.random.default_rng(0)
+    bright = 200.0 - 0.5 * np.hypot(*np.mgrid[-120:120, -120:120])
+    for dark in (bright, np.full_like(bright, 60.0)):
+        images = [(dark + noise.normal(0.0, 4.0, dark.shape)).clip(0, 255).astype(np.uint8) for _ in range(8)]
+        assert turn_error(images, STEP * np.arange(8), CAMERA, np.eye(3))
 
 
 def test_turns_are_not_told_without_turning(drive):

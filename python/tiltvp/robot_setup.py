@@ -22,7 +22,8 @@ from tiltvp.streams.odometry import Motion
 from tiltvp.streams.wheels import Wheels
 from tiltvp.surround import surround_mask
 from tiltvp.tilt import TiltEstimate, TiltEstimator
-from tiltvp.turning import TurnAxis, TurnCheck, made_small, small_camera, turn_axis
+from tiltvp.turn_errors import TurnError, turn_error
+from tiltvp.turning import TurnCheck, made_small, small_camera, turn_axis
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -80,7 +81,9 @@ class RobotSetup:
     body: BodyMask
     """The robot's own body in view."""
     turns: TurnCheck | None
-    """Whether images turn as the odometry says; None without odometry."""
+    """Which way round images turn by the odometry; None without odometry."""
+    turn_error: TurnError | None
+    """How far their turns are off what it says; None without odometry."""
     mounting: MountingTilt
     """Roll and pitch of the mounting."""
     problems: dict[str, TiltvpError]
@@ -93,13 +96,25 @@ class RobotSetup:
         return best == given and self.direction.probabilities[best] >= SURE
 
     @property
+    def turns_reason(self) -> str:
+        """How images turn by the odometry, in a sentence; empty without odometry."""
+        if self.turns is None or self.turn_error is None:
+            return ""
+        return self.turns.reason if self.turns.reversed or self._turns_fit else self.turn_error.reason
+
+    @property
+    def _turns_fit(self) -> bool:
+        """Whether images turn by as much as the odometry says, as far as is known: about another axis none do."""
+        return not self.sure_of_direction or self.turn_error is None or bool(self.turn_error)
+
+    @property
     def reasons(self) -> list[str]:
         """What keeps it from being used, a sentence each."""
         found = [] if self.sure_of_direction else [f"which way is up is not sure: {self.direction.direction_reason}"]
         if not self.direction.lens:
             found.append(self.direction.lens.reason)
-        if self.turns is not None and self.turns.reversed:
-            found.append(self.turns.reason)
+        if self.turns is not None and (self.turns.reversed or not self._turns_fit):
+            found.append(self.turns_reason)
         return found if self.mounting else [*found, self.mounting.reason]
 
     def again(self, robot: Robot) -> Robot:
@@ -150,11 +165,7 @@ def find_setup(
     wheels, topics = Wheels() if wheels is None else wheels, {} if topics is None else topics
     refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
     refuse_unless(topics, dict, "topics", "a dict")
-    usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
-    if usable < LEAST:
-        words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
-        words = f"{words} of {camera.width} x {camera.height} pixels, each another than the one before"
-        raise InvalidInputError(f"{frames.source}: {words}{_first_problem(frames, camera)}")
+    _refuse_few(frames, camera)
     rim, body = None, BodyMask(None, 0, "a mask was given")
     if mask is None:
         inside, body = rim_and_body(frames, camera)
@@ -162,7 +173,8 @@ def find_setup(
 
     looked_at = (image for _, image in spread(frames, camera, LOOKED_AT))
     direction = check_setup(looked_at, camera, robot_from_camera, mask=mask)
-    axis = None if motions is None else _turn_axis(frames, camera, motions, robot_from_camera)
+    seen = None if motions is None else turning(frames, camera, motions)
+    axis = None if seen is None else turn_axis(*seen, robot_from_camera)
     if axis:
         direction = _told_by_turns(direction, axis.best)
     if robot_from_camera is None:
@@ -171,6 +183,7 @@ def find_setup(
     else:
         rotation = mounting_from(robot_from_camera)
     turns = None if axis is None else axis.check(direction.given)
+    error = None if seen is None else turn_error(*seen, rotation)
     estimator = TiltEstimator(camera, **TILT_OPTIONS, robot_from_camera=rotation, mask=mask)
     tilts = drive_tilts(frames, estimator, motions, advance=advance)
     mounting = mounting_tilt(
@@ -184,21 +197,29 @@ def find_setup(
         wheels=wheels,
         topics=topics,
     )
-    return RobotSetup(robot, rotation, direction, rim, body, turns, mounting, tilts.problems)
+    return RobotSetup(robot, rotation, direction, rim, body, turns, error, mounting, tilts.problems)
 
 
-def _turn_axis(
-    frames: Frames, camera: Camera, motions: Sequence[Motion | None], robot_from_camera: ArrayLike | None
-) -> TurnAxis:
-    headings = np.cumsum([0.0 if motion is None else motion.yaw_rad for motion in motions])
+def _refuse_few(frames: Frames, camera: Camera) -> None:
+    usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
+    if usable < LEAST:
+        words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
+        words = f"{words} of {camera.width} x {camera.height} pixels, each another than the one before"
+        raise InvalidInputError(f"{frames.source}: {words}{_first_problem(frames, camera)}")
+
+
+def turning(
+    frames: Frames, camera: _core.Camera, motions: Sequence[Motion | None]
+) -> tuple[list[Image], NDArray[np.float64], _core.Camera]:
+    """Small images, spread over the drive, their headings, and their camera: what `check_turns` takes."""
+    headings: NDArray[np.float64] = np.cumsum([0.0 if motion is None else motion.yaw_rad for motion in motions])
     # Nobody knows the heading of a frame of whose time the odometry does not tell.
-    small = [
-        (number, made_small(gray_from(image), camera))
+    small = {
+        number: made_small(gray_from(image), camera)
         for number, image in spread(frames, camera, TURNED)
         if motions[number] is not None
-    ]
-    turned = headings[[number for number, _ in small]]
-    return turn_axis((image for _, image in small), turned, small_camera(camera), robot_from_camera)
+    }
+    return list(small.values()), headings[list(small)], small_camera(camera)
 
 
 def _told_by_turns(direction: SetupCheck, turns_about: str) -> SetupCheck:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from tiltvp._core import Camera
 
 __all__ = [
-    "FrameDelay", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small", "small_camera",
-    "telling_frames", "turn_axis",
+    "LEAST_PAIRS", "FrameDelay", "Pictures", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small",
+    "pairs_of", "peak", "small_camera", "telling_frames", "turn_axis",
 ]  # fmt: skip
 
 _SIDE_PX: Final = 120
@@ -38,7 +38,7 @@ _TURNED_RAD: Final = math.radians(45.0)
 """Headings have to be so far apart before there is an answer."""
 _SIGMAS: Final = 3.0
 """By how many of its standard errors the mean difference has to be off zero."""
-_LEAST: Final = 4
+LEAST_PAIRS: Final = 4
 _REACH_MAX_S: Final = 60.0
 """Farthest delay that is looked at: clocks of one robot that are a minute apart are not set at all."""
 _COARSE_STEP_S: Final = 0.1
@@ -76,7 +76,7 @@ class TurnCheck:
     @property
     def told(self) -> bool:
         """Whether the images tell at all."""
-        return self.pairs >= _LEAST and self.turned_rad >= _TURNED_RAD and abs(self.sigmas) >= _SIGMAS
+        return self.pairs >= LEAST_PAIRS and self.turned_rad >= _TURNED_RAD and abs(self.sigmas) >= _SIGMAS
 
     @property
     def reversed(self) -> bool:
@@ -142,7 +142,7 @@ class TurnAxis:
         return max(self.likeness, key=lambda name: self.likeness[name])
 
     def __bool__(self) -> bool:
-        return self.pairs >= _LEAST and self.turned_rad >= _TURNED_RAD and self.sigmas >= _SIGMAS
+        return self.pairs >= LEAST_PAIRS and self.turned_rad >= _TURNED_RAD and self.sigmas >= _SIGMAS
 
     def check(self, up: str) -> TurnCheck:
         """Whether images turn as told where that direction is up: what `check_turns` says."""
@@ -184,14 +184,11 @@ def _turned_back(
     images: Iterable[ArrayLike], yaw_rad: ArrayLike, camera: Camera, ups: list[NDArray[np.float64]]
 ) -> tuple[float, NDArray[np.float64]]:
     """How far headings are apart at most, and how alike pairs are, (P, U), turned back about each direction (3,)."""
-    pictures = _Pictures(images, camera)
-    headings = array_from(yaw_rad, "yaw_rad")
-    if headings.shape != (len(pictures),) or not np.isfinite(headings).all():
-        raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(pictures)},) of finite angles")
-    headings = np.unwrap(headings)  # Those of a compass jump by a turn, which is none.
+    pictures = Pictures(images, camera)
+    headings = pictures.headings(yaw_rad)
     scores = np.array([
         [pictures.likeness(k, other, up * float(headings[k] - headings[other])) for up in ups]
-        for k, other in _pairs(headings)
+        for k, other in pairs_of(headings)
     ]).reshape(-1, len(ups))  # fmt: skip
     turned = min(float(np.ptp(headings)) if len(headings) else 0.0, math.tau)
     return turned, scores[np.isfinite(scores).all(axis=1)]
@@ -242,14 +239,14 @@ def frame_delay(
     refuse_unless(odometry, Odometry, "odometry", "a tiltvp.streams.Odometry")
     if not 0.0 < number_from(reach_s, "reach_s") <= _REACH_MAX_S:
         raise InvalidInputError(f"reach_s = {reach_s}, expected seconds above 0, at most {_REACH_MAX_S:g}")
-    pictures, up = _Pictures(images, camera), _up_of(robot_from_camera)
+    pictures, up = Pictures(images, camera), _up_of(robot_from_camera)
     times = array_from(times_s, "times_s")
     if times.shape != (len(pictures),) or not np.isfinite(times).all():
         raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(pictures)},) of finite times")
     headings = odometry.at(times).yaw_rad
     if headings is None:
         raise InvalidInputError(f"{odometry.source}: distances without turns, expected the distance between the wheels")
-    pairs = _pairs(headings)
+    pairs = pairs_of(headings)
 
     def likenesses(delays: NDArray[np.floating]) -> NDArray[np.float64]:
         found = np.full((len(pairs), len(delays)), np.nan)
@@ -272,9 +269,9 @@ def frame_delay(
     fine = fine[known & np.isfinite(fine).all(axis=1)]
     if len(fine) < _PARTS:
         return FrameDelay(rough, math.inf, 0.0, len(fine))
-    best, likeness = _peak(delays, fine)
+    best, likeness = peak(delays, fine)
     parts = np.arange(len(fine)) * _PARTS // len(fine)
-    without = np.array([_peak(delays, fine[parts != part])[0] for part in range(_PARTS)])
+    without = np.array([peak(delays, fine[parts != part])[0] for part in range(_PARTS)])
     sigma = math.sqrt((_PARTS - 1) / _PARTS * float(np.sum((without - without.mean()) ** 2)))
     # At the border of what is looked at there is no peak.
     sigma = math.inf if abs(rough) > reach_s - 0.5 * _COARSE_STEP_S else max(sigma, _DELAY_FLOOR_S)
@@ -309,7 +306,7 @@ def telling_frames(times_s: ArrayLike, odometry: Odometry) -> NDArray[np.intp]:
     return numbers[first : first + _CLOCK_FRAMES]
 
 
-def _peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[float, float]:
+def peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[float, float]:
     """The delay (D,) at which pairs (P, D) are most alike, by a parabola, and how much they are."""
     mean = table.mean(axis=0)
     at = int(np.clip(np.argmax(mean), 1, len(delays) - 2))
@@ -319,7 +316,7 @@ def _peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[flo
     return float(delays[at] + np.clip(shift, -1.0, 1.0) * (delays[1] - delays[0])), float(top)
 
 
-class _Pictures:
+class Pictures:
     """Small images, and how alike two of them are after a turn of the robot."""
 
     def __init__(self, images: Iterable[ArrayLike], camera: Camera) -> None:
@@ -333,6 +330,14 @@ class _Pictures:
 
     def __len__(self) -> int:
         return len(self._grays)
+
+    def headings(self, yaw_rad: ArrayLike) -> NDArray[np.float64]:
+        """One for each image; those of a compass jump by a turn, which is none. Raises `InvalidInputError`."""
+        headings = array_from(yaw_rad, "yaw_rad")
+        if headings.shape != (len(self),) or not np.isfinite(headings).all():
+            raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(self)},) of finite angles")
+        found: NDArray[np.float64] = np.unwrap(headings)
+        return found
 
     def likeness(self, k: int, other: int, turn_rad: NDArray[np.float64]) -> float:
         """Correlation of two images where the camera turned by a rotation vector (3,) from the other to `k`; NaN: not
@@ -360,7 +365,7 @@ def made_small(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
     return np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA))
 
 
-def _pairs(headings: NDArray[np.float64]) -> list[tuple[int, int]]:
+def pairs_of(headings: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Each image with the next ones that have turned by an angle that is compared."""
     low, high = _TURNS_RAD
     found = []

@@ -14,11 +14,19 @@ if TYPE_CHECKING:
     from tiltvp import TiltEstimator, _core
     from tiltvp.lines import LineExtractor
     from tiltvp.segments import SegmentDetector
-    from tiltvp.streams import Frames
+    from tiltvp.streams import FrameMotions, Frames
 
     Mounted = TiltEstimator | LineExtractor
 
-__all__ = ["check_panoramas", "check_sizes", "tell_lens_of", "tell_setup", "tell_setup_of", "tell_unusable"]
+__all__ = [
+    "check_panoramas",
+    "check_sizes",
+    "tell_lens_of",
+    "tell_setup",
+    "tell_setup_of",
+    "tell_turns",
+    "tell_unusable",
+]
 
 
 def check_sizes(frames: Frames, camera: _core.Camera, *, names_each: bool) -> None:
@@ -74,9 +82,9 @@ def tell_setup(images: Sequence[NDArray[Any]], estimator: Mounted, mask: NDArray
         complain(f"{suspect}: {found.reason}")
 
 
-def tell_setup_of(frames: Frames, finder: Mounted | SegmentDetector) -> None:
-    """`tell_setup` of a few frames, spread over a source that can be read again; of the calibration alone where edges
-    are looked for whichever way the camera is mounted."""
+def tell_setup_of(frames: Frames, finder: Mounted | SegmentDetector, moved: FrameMotions | None = None) -> None:
+    """`tell_setup` of a few frames, spread over a source that can be read again, and `tell_turns` of more; of the
+    calibration alone where edges are looked for whichever way the camera is mounted."""
     from tiltvp.segments import SegmentDetector
 
     mask = finder.options["mask"]
@@ -84,6 +92,7 @@ def tell_setup_of(frames: Frames, finder: Mounted | SegmentDetector) -> None:
         tell_lens_of(frames, finder.camera, mask, "--camera")
     elif images := _few(frames, finder.camera):
         tell_setup(images, finder, mask)
+        tell_turns(frames, finder, moved)
 
 
 def tell_lens_of(frames: Frames, camera: _core.Camera, mask: NDArray[Any] | None, option: str) -> None:
@@ -94,6 +103,21 @@ def tell_lens_of(frames: Frames, camera: _core.Camera, mask: NDArray[Any] | None
     images = _few(frames, camera)
     if images and not (found := check_lens(images, camera, mask=mask)):
         complain(f"{option}: {found.reason}")
+
+
+def tell_turns(frames: Frames, estimator: Mounted, moved: FrameMotions | None) -> None:
+    """A line on stderr where images turn otherwise than the odometry tells, as of another sense, clock or unit."""
+    if moved is None or not moved.turns_known:
+        return
+    from tiltvp import check_turns
+    from tiltvp.robot_setup import turning
+    from tiltvp.turn_errors import turn_error
+
+    seen = turning(frames, estimator.camera, moved.motions)
+    way = check_turns(*seen, estimator.robot_from_camera)
+    found = way if way.reversed else turn_error(*seen, estimator.robot_from_camera)
+    if way.reversed or not found:
+        complain(f"--odometry: {found.reason}")
 
 
 def _few(frames: Frames, camera: _core.Camera) -> list[NDArray[Any]]:

@@ -122,7 +122,7 @@ def level(
     moved = motion.motions_of(robot, frames) if fused else None
     filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
     if looks.camera is not None and looks.camera.model != "equirectangular":
-        tell_setup_of(frames, looks.of(looks.camera.width, looks.camera.height).estimator)
+        tell_setup_of(frames, looks.of(looks.camera.width, looks.camera.height).estimator, moved)
     work = Levelling(looks, filtering, copy_unlevelled)
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:

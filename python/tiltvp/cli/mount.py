@@ -64,7 +64,7 @@ def mount(
     check_apart(frames, out, beside=(motion.odometry, mounted.mask, camera.camera))
     moved = motion.motions_of(robot, frames)
     motions = moved.motions if moved is not None and moved.turns_known else None
-    tell_setup_of(frames, estimator)
+    tell_setup_of(frames, estimator, moved)
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
     tell_unusable(frames, tilts.problems)

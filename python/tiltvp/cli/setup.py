@@ -108,7 +108,7 @@ def _lines(found: RobotSetup) -> list[str]:
     rim = {True: "a dark surround that the calibration does not know is left out", False: "none found"}
     lines.append(f"rim: {found.body.reason if found.rim is None else rim[found.rim]}")
     lines.append(f"body: {found.body.reason}")
-    lines.append("turns: no odometry" if found.turns is None else f"turns: {found.turns.reason}")
+    lines.append("turns: no odometry" if found.turns is None else f"turns: {found.turns_reason}")
     first, *others = mounting_lines(found.mounting)
     return [*lines, f"mounting: {first}", *others]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 from tiltvp.cli.answers import check_answers, check_stamps, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.frame_checks import tell_setup
+from tiltvp.cli.frame_checks import tell_setup, tell_turns
 from tiltvp.cli.options import CameraOptions, FrameRate, MethodOptions, ThreadCount
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import TiltEstimator
-    from tiltvp.streams import Frame, Frames
+    from tiltvp.streams import Frame, FrameMotions, Frames
 
     Picture = NDArray[np.uint8]
     Named = tuple[Frame, str, Outcome, Picture | None]
@@ -111,7 +111,7 @@ def tilt(
     moved = motion.motions_of(robot, frames) if filtering.filter else None
     filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
-    work, judge = Work(_checked(estimator, frames), overlay, level, filtering, showing.asked), filtering.judge()
+    work, judge = Work(_checked(estimator, frames, moved), overlay, level, filtering, showing.asked), filtering.judge()
     if cluster is not None and out is not None:
         return tilts_on_cluster(cluster, files_of(frames), work, out)
     answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)
@@ -193,10 +193,10 @@ class Answers:
                 say(written)
 
 
-def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
+def _checked(estimator: TiltEstimator, frames: Frames, moved: FrameMotions | None) -> TiltEstimator:
     """The estimator without the dark surround and the body of the robot that the frames have, if no mask is given; a
-    line on stderr says so of each, and one if they speak against the mounting. Of frames that come only once nothing is
-    looked at first.
+    line on stderr says so of each, and one if they speak against the mounting or the odometry. Of frames that come only
+    once nothing is looked at first.
     """
     import numpy as np
 
@@ -220,6 +220,7 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
         if mask is not None:
             estimator = estimator.with_options(mask=mask)
     tell_setup(images, estimator, mask)
+    tell_turns(frames, estimator, moved)
     return estimator
 
 
