@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -44,6 +46,43 @@ def test_videos_have_their_own_times(ending: str, codec: str, tmp_path: Path) ->
     for number, frame in zip((2, 5, 11), frames.sample([2, 5, 11]), strict=True):
         assert frame.name == frames.names[number] == f"{path}#{number:02d}"
         assert abs(int(np.median(frame.read())) - 20 * number) < 8
+
+
+def test_what_a_video_was_trimmed_by_is_no_frame(tmp_path: Path) -> None:
+    """Editors leave the frames from the key frame to the cut in the file, and tell players to pass over them."""
+    whole, path = tmp_path / "whole.mp4", tmp_path / "trimmed.mp4"
+    one_key = {"sc_threshold": "1000000000"}
+    write_video(whole, map(shade, range(12)), [100 * k for k in range(12)], options=one_key)
+    with av.open(str(whole)) as source, av.open(str(path), "w") as target:
+        stream = source.streams.video[0]
+        copied = target.add_stream_from_template(stream)
+        for packet in source.demux(stream):
+            if packet.dts is not None:
+                packet.pts -= round(0.5 / stream.time_base)
+                packet.dts -= round(0.5 / stream.time_base)
+                packet.stream = copied
+                target.mux(packet)
+    frames = open_frames(path)
+    assert frames.times_s == pytest.approx(0.1 * np.arange(7), abs=1e-3)
+    for chosen in (list(frames), list(frames.sample(range(7)))):
+        assert [round(float(np.median(one.read())) / 20) for one in chosen] == [5, 6, 7, 8, 9, 10, 11]
+
+
+@pytest.mark.parametrize("package", ["av", "cv2"])
+def test_videos_that_are_shown_turned_are_told(package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "drive.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.set_display_rotation(90)
+        for k in range(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(shade(k), format="bgr24")))
+        container.mux(stream.encode())
+    if package == "cv2":
+        monkeypatch.setitem(sys.modules, "av", None)
+    frames = open_frames(path)
+    assert next(iter(frames)).read().shape == (48, 64, 3)
+    assert "shown turned by 90 degrees counter-clockwise, which is not followed" in frames.notes[-1]
 
 
 @pytest.mark.parametrize("name", ["drive.mp4", "drive.mpg"])

@@ -23,6 +23,10 @@ __all__ = ["VIDEO_ENDINGS", "open_video"]
 
 VIDEO_ENDINGS: Final = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
 _DAMAGED: Final = "cannot be decoded"
+_TURNED: Final = (
+    "is to be shown turned by {} degrees counter-clockwise, which is not followed: pixels stay where the sensor has "
+    "them, as those of the calibration have to"
+)
 _NO_SEEKING: Final = "mpeg"
 """Program streams of MPEG, in which seeking does not lead to key frames."""
 _MATROSKA: Final = b"\x1a\x45\xdf\xa3"
@@ -77,7 +81,14 @@ class _Video(Frames):
             self.rate_hz = median_rate_hz(self.times_s)
         if not complete or _is_cut_off(path):
             notes.append(f"{path}: ends before its end, after {counted(len(stamps), 'frames')} (cut off?)")
+        if turned_deg := self._turned_deg():
+            notes.append(f"{path}: {_TURNED.format(turned_deg)}")
         self.notes = tuple(notes)
+
+    def _turned_deg(self) -> int:
+        with _opened(self._path) as container:
+            first = next(_decoded(container), None)
+            return 0 if first is None else first.rotation % 360
 
     def __iter__(self) -> Iterator[Frame]:
         """Frames in the places that their stamps have; what is missing cannot be decoded."""
@@ -162,21 +173,22 @@ def _check_size(path: Path, width: int, height: int) -> None:
 
 
 def _stamps(container: Any, stream: Any) -> tuple[list[int | None], list[int | None], bool]:
-    """When each packet is shown, in the order of the file, and those of key frames; whether the file was read to its
-    end."""
+    """When each packet is shown, in the order of the file, and those of key frames, which need not be shown themselves
+    where a video was trimmed; whether the file was read to its end."""
     import av
 
-    found: list[tuple[int | None, bool]] = []
+    found: list[tuple[int | None, bool, bool]] = []
     complete = True
     try:
         found.extend(
-            (packet.pts, packet.is_keyframe)
+            (packet.pts, packet.is_keyframe, packet.is_discard)
             for packet in container.demux(stream)
             if packet.size and not packet.is_corrupt
         )
     except av.FFmpegError:
         complete = False
-    return [stamp for stamp, _ in found], [stamp for stamp, is_key in found if is_key], complete
+    shown = [stamp for stamp, _, is_discard in found if not is_discard]
+    return shown, [stamp for stamp, is_key, _ in found if is_key], complete
 
 
 def _is_cut_off(path: Path) -> bool:
@@ -217,7 +229,9 @@ class _OpenCvVideo(Frames):
 
         self.source, self._path = str(path), path
         capture = self._capture()
-        count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        count, turned_deg = (
+            max(0, int(capture.get(one))) for one in (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_ORIENTATION_META)
+        )
         rate = float(capture.get(cv2.CAP_PROP_FPS))
         _check_size(path, *(int(capture.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)))
         capture.release()
@@ -230,6 +244,8 @@ class _OpenCvVideo(Frames):
             f"{path}: read as {self.rate_hz:.6g} even frames a second; "
             f"{MissingExtraError.of('reading its time stamps', 'video', without)}",
         )
+        if turned_deg:
+            self.notes += (f"{path}: {_TURNED.format(-turned_deg % 360)}",)
 
     def _capture(self) -> Any:
         import cv2
