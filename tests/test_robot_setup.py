@@ -217,15 +217,17 @@ def test_frames_and_motions_that_do_not_fit_are_refused(drive):
         find_setup(NamedImages(), CAMERA)
 
 
-@pytest.mark.parametrize("verb", ["setup", "mount", "tilt", "level"])
+@pytest.mark.parametrize("verb", ["setup", "mount", "tilt", "level", "track"])
 def test_turns_by_another_angle_than_the_odometry_tells_are_told(verb, drive, tmp_path, capsys):
     """As by another wheel base, or frames of another clock: mountings were 10 degrees off, and filtered tilts 6."""
     table = tmp_path / "odometry.csv"
     for scale in (1.0, 1.5):
         rows = "\n".join(f"{scale * STEP if k else 0.0},0.0" for k in range(COUNT))
         table.write_text(f"yaw_rad,distance_m\n{rows}\n")
-        more = {"mount": [], "setup": ["--out", tmp_path / "robot.toml"]}.get(verb, ["--filter", "--out"])
-        more += {"tilt": [tmp_path / "tilts.csv"], "level": [tmp_path / "level"]}.get(verb, [])
+        more = {
+            "setup": ["--out", tmp_path / "robot.toml"], "mount": [], "tilt": ["--filter"],
+            "level": ["--filter", "--out", tmp_path / "level"], "track": ["--out", tmp_path / "tracks.csv"],
+        }[verb]  # fmt: skip
         code = run(verb, drive / "frames", "--camera", drive / "camera.toml", "--odometry", table, *more, "--overwrite")
         said = capsys.readouterr().err
         assert ("pairs of images turn otherwise than the odometry tells by 8 degrees" in said) == (scale != 1.0)

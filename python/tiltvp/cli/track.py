@@ -101,7 +101,7 @@ def track(
     frames = frames_of.open(words, lens)
     check_apart(frames, video, out, plot, beside=(motion.odometry, options.mask, camera.camera))
     motions = needed_turns(motion.motions_of(robot, frames))
-    tell_setup_of(frames, extractor)
+    tell_setup_of(frames, extractor, motions)
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, watching.viewer() as viewer:
