@@ -187,7 +187,8 @@ def test_nothing_is_made_up_outside_and_in_gaps() -> None:
     motions = odometry.motions([-0.1, 0.0, 1.0, 2.3])
     assert [motion and motion.distance_m for motion in motions] == [None, 0.0, None, 2.3]
     assert odometry.missing([-0.1, 0.0, 1.0, 2.4], ["a", "b", "c", "d"]) == (
-        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) and 1 frame in gaps of over 0.5 s (c)"
+        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) "
+        "and 1 frame in gaps of over 0.5 s by --odometry-gap (c)"
     )
     assert odometry.missing([0.0, 0.2], ["a", "b"]) is None
     with pytest.raises(InvalidInputError, match=r"no velocities from 0\.200 to 2\.200 s"):
@@ -370,6 +371,9 @@ def test_rows_of_images_without_times(tmp_path: Path) -> None:
     told = frame_motions(frames, path)
     assert told.motions == [Motion(), Motion(0.0, 1.0), Motion(0.0, 1.0)]
     assert told.times_s.tolist() == [3.0, 4.0, 5.0]
+    path.write_text("time_s,file,distance_m\n3,2.png,0\n4,0.png,1\n5,1.png,1\n")
+    with pytest.raises(InvalidInputError, match=r"in the order of its images, by the times of .*: its clock goes back"):
+        frame_motions(frames, path)
     path.write_text("time_s,distance_m\n0,0\n1,1\n")
     with pytest.raises(InvalidInputError, match=r"no times of the images, expected them in frames\.csv"):
         frame_motions(frames, path)
@@ -381,6 +385,9 @@ def test_rows_of_images_without_times(tmp_path: Path) -> None:
     with pytest.raises(
         InvalidInputError, match=r"none is left of .*from 100\.000 to 102\.000 s; expected clocks that agree"
     ):
+        frame_motions(open_frames(tmp_path), path)
+    path.write_text("time_s,distance_m\n99.5,0\n102.5,1\n")
+    with pytest.raises(InvalidInputError, match=r"by --odometry-gap.*expected samples at most 0\.5 s apart"):
         frame_motions(open_frames(tmp_path), path)
 
 

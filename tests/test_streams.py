@@ -316,6 +316,16 @@ def test_a_drive_s_folder_and_times_of_images(tmp_path: Path) -> None:
     assert open_frames(tmp_path / "images").times_s is None
 
 
+def test_hidden_files_of_a_folder_are_no_images(tmp_path: Path) -> None:
+    """A Mac puts ._a.png beside a.png where a file system has no place for what it knows of it."""
+    for name in ("a.png", "b.png"):
+        tiltvp.write_image(tmp_path / name, np.zeros((4, 4), np.uint8))
+        (tmp_path / f"._{name}").write_bytes(b"\0\5\x16\7")
+    (tmp_path / "frames.csv").write_text("file,time_s\na.png,1\nb.png,2\n")
+    frames = open_frames(tmp_path)
+    assert [Path(name).name for name in frames.names or ()] == ["a.png", "b.png"]
+
+
 def test_names_that_are_times(tmp_path: Path) -> None:
     for name in ("1403636579763555584", "1403636579813555456"):
         tiltvp.write_image(tmp_path / f"{name}.png", shade(1))

@@ -137,7 +137,9 @@ def _orientation(file: Path) -> int:
 def _images_of(folder: Path) -> list[Path]:
     for place in (folder, *(folder / name for name in _INNER)):
         if place.is_dir():
-            found = [file for file in place.iterdir() if file.suffix.lower() in IMAGE_ENDINGS and file.is_file()]
+            # Hidden ones, as the ._a.png that a Mac puts beside a.png, are no images; patterns pass over them too.
+            files = (file for file in place.iterdir() if not file.name.startswith("."))
+            found = [file for file in files if file.suffix.lower() in IMAGE_ENDINGS and file.is_file()]
             if found:
                 return sorted(found, key=_by_name)
     return []

@@ -110,6 +110,7 @@ def frame_motions(
     times = frames.times_s
     if times is None and table.times_s is not None:
         times = table.times_s[rows]
+        refuse_set_back(times, f"{frames.source} in the order of its images, by the times of {table.name}")
     notes = (*(() if turns else (_no_turns(table.name),)), *_far_steps(motions, frames.names, table.name))
     return FrameMotions(motions, turns, times, notes, table.distances_known)
 
@@ -184,8 +185,10 @@ def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:
     motions = odometry.motions(frames.times_s)
     if not any(motion is not None for motion in motions):
         first, last = frames.times_s[0], frames.times_s[-1]
+        alone = odometry.at(frames.times_s).outside.all()
+        expected = "clocks that agree" if alone else f"samples at most {odometry.gap_max_s:g} s apart"
         raise InvalidInputError(
-            f"{told}: none is left of {frames.source}, from {first:.3f} to {last:.3f} s; expected clocks that agree"
+            f"{told}: none is left of {frames.source}, from {first:.3f} to {last:.3f} s; expected {expected}"
         )
     turns = odometry.yaw_rad is not None
     notes = (*odometry.notes, None if turns else _no_turns(odometry.source), told, gaps, odometry.jumps)

@@ -226,7 +226,7 @@ class Odometry:
         parts = []
         for flags, why in (
             (there.outside, "outside its span"),
-            (there.in_gap, f"in gaps of over {self.gap_max_s:g} s"),
+            (there.in_gap, f"in gaps of over {self.gap_max_s:g} s by --odometry-gap"),
         ):
             places = np.flatnonzero(flags)
             if len(places):
