@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tiltvp
@@ -45,3 +46,20 @@ def test_drivers_of_fisheyes_write_a_fifth_zero(fifth: float, tmp_path: Path) ->
             recorded_camera(recording)
     else:
         assert [recorded_camera(recording).parameters[f"k{k}"] for k in (1, 2, 3, 4)] == lens
+
+
+def test_the_calibration_of_another_camera_of_a_recording_is_refused(tmp_path: Path) -> None:
+    """Of two cameras whose one CameraInfo was recorded."""
+    made = Bag("mcap")
+    made.camera_info(
+        START_S, 64, 48, "equidistant", [0.01, -0.02, 0.003, -0.001], [30.0, 0, 31.5, 0, 30, 23.5, 0, 0, 1]
+    )
+    made.rows[-1][3].header.frame_id = "right"
+    for side in ("left", "right"):
+        made.image(f"/{side}/image", START_S, np.zeros((48, 64), np.uint8), "mono8")
+        made.rows[-1][3].header.frame_id = side
+    recording = Recording(made.write(tmp_path))
+    assert recorded_camera(recording, images="/right/image").width == 64
+    with pytest.raises(InvalidInputError, match=r"/camera_info is of the frame of /right/image, not of .* /left/image"):
+        recorded_camera(recording, images="/left/image")
+    assert recorded_camera(recording, "/camera_info", images="/left/image").width == 64, "who names it knows"

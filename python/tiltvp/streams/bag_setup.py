@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +17,7 @@ from tiltvp.formats.document import Document
 from tiltvp.formats.ros import parse
 from tiltvp.rotations import rotation_from_document, rotation_from_quaternion
 from tiltvp.streams.bag_images import CAMERA_KINDS, IMAGE_KINDS, is_rectified
-from tiltvp.streams.bags import Recording
+from tiltvp.streams.bags import Recording, Topic
 from tiltvp.streams.outputs.transforms import TRANSFORM_TOPIC
 
 if TYPE_CHECKING:
@@ -34,16 +36,36 @@ def recorded_camera(recording: Recording, topic: str | None = None, *, images: s
     `images` is the topic of its images, by default the only one: where they are called rectified (`image_rect`) their
     lens is the pinhole of P, else that of K and D.
 
-    Raises `InvalidInputError` that lists the topics, `CalibrationError` for a lens that is not supported and for a
-    camera that was not calibrated.
+    Raises `InvalidInputError` that lists the topics, and where the only one is of the frame of other images;
+    `CalibrationError` for a lens that is not supported and for a camera that was not calibrated.
     """
     refuse_unless(recording, Recording, "recording", "a tiltvp.streams.Recording")
     chosen = recording.choose(CAMERA_KINDS, "--camera-name", topic)
+    seen = [one for one in recording.topics if one.kind in IMAGE_KINDS and one.count > 0]
     if images is None:
-        seen = [one.name for one in recording.topics if one.kind in IMAGE_KINDS and one.count > 0]
-        images = seen[0] if len(seen) == 1 else ""
-    info = next(content for _, content in recording.decoded(chosen))
+        images = seen[0].name if len(seen) == 1 else ""
+    info = _first(recording, chosen)
+    if topic is None:
+        _refuse_of_others(recording, chosen, str(info.header.frame_id), seen, images)
     return camera_from_message(info, rectified=is_rectified(images), source=f"{recording.path} {chosen.name}")
+
+
+def _refuse_of_others(recording: Recording, info: Topic, frame: str, seen: Sequence[Topic], images: str) -> None:
+    """Refuses the CameraInfo of a frame that is that of other images than those that were chosen."""
+    frames = dict[str, str]()
+    for one in seen:
+        with suppress(InvalidInputError):  # Of a damaged message, which reading it tells.
+            frames[one.name] = _plain(_first(recording, one).header.frame_id)
+    own = [name for name, of_images in frames.items() if of_images == _plain(frame)]
+    if own and frames.get(images) not in (None, "", _plain(frame)):
+        raise InvalidInputError(
+            f"{recording.path}: {info.name} is of the frame of {', '.join(own)}, not of that of {images}, expected its "
+            f"own calibration, or --camera-name {info.name} where that is it"
+        )
+
+
+def _first(recording: Recording, topic: Topic) -> Any:
+    return next(content for _, content in recording.decoded(topic))
 
 
 def camera_from_message(message: Any, *, rectified: bool = False, source: str = "CameraInfo") -> Camera:
@@ -111,11 +133,11 @@ def robot_from_camera(
     refuse_unless(recording, Recording, "recording", "a tiltvp.streams.Recording")
     written = [one for one in recording.topics if one.name == TRANSFORM_TOPIC]
     if camera_frame is None and written and not any(one.kind in IMAGE_KINDS for one in recording.topics):
-        text = str(next(content for _, content in recording.decoded(written[0])).data)
+        text = str(_first(recording, written[0]).data)
         return rotation_from_document(Document(recording.path, text))
     if camera_frame is None:
         images = recording.choose(IMAGE_KINDS, "--topic", topic)
-        camera_frame = str(next(content for _, content in recording.decoded(images)).header.frame_id)
+        camera_frame = str(_first(recording, images).header.frame_id)
     static = recording.choose((_TRANSFORMS,), _STATIC, _STATIC)
     parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
     several: set[str] = set()
