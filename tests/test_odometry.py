@@ -308,6 +308,22 @@ def test_images_of_a_folder_come_in_the_order_of_their_times(tmp_path: Path) -> 
     assert "in the order of their times" in frames.notes[0]
 
 
+@pytest.mark.parametrize("kind", ["poses", "wheels"])
+def test_a_driver_that_was_started_again_behind_a_gap_is_told(kind: str) -> None:
+    """Its poses and counters are 0 again, and no step of a gap is too long for a robot."""
+    times = np.concatenate([0.1 * np.arange(30), 4.0 + 0.1 * np.arange(30)])
+
+    def made(way: np.ndarray) -> Odometry:
+        if kind == "poses":
+            return Odometry.from_poses(times, 0.3 + way, 0.0 * way, 0.0 * way)
+        return Odometry.from_wheels(times, np.stack([way, way], axis=1))
+
+    assert made(0.2 * times).notes == ()
+    assert made(0.0 * times).notes == (), "a robot that stands"
+    (told,) = made(np.where(times < 4.0, 0.2 * times, 0.2 * (times - 4.0))).notes
+    assert "begins anew behind 1 gap, the first at 4.000 s" in told
+
+
 @pytest.mark.parametrize("ahead_m", [0.0, 0.1])
 def test_poses_that_move_sideways_are_told(ahead_m: float, tmp_path: Path) -> None:
     """As those of a frame that is not at the axle, of a robot that turns in place; millimetres of noise are nothing."""

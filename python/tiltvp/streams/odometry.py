@@ -34,6 +34,8 @@ _JUMP_PER_S2: Final = 10.0
 _JUMP_SHARE: Final = 3.0
 """Metres or radians of a step that jumps, as of a pose that was set anew, beyond so many steps as those around it
 (messages may be late) and what tyres of friction 1 speed up by. A localisation corrects itself by less."""
+_FRESH: Final = 1e-3
+"""Metres and radians by which a driver's first message is off 0: nobody parks a robot as near to where it was."""
 _LOST: Final = 3.0
 """Steps of time by so many of which two samples are apart where some between them are lost: clocks jitter by less."""
 
@@ -115,7 +117,9 @@ class Odometry:
                 raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected metres, at most {WHEEL_BASE_MAX_M:g}")
             with np.errstate(over="ignore", invalid="ignore"):
                 yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
-        return cls(array_from(times_s, "times_s"), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
+        times = array_from(times_s, "times_s")
+        notes = (*texts_from(notes, "notes"), *_begins_anew(times, wheels, gap_max_s, source))
+        return cls(times, wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
 
     @classmethod
     def from_velocities(
@@ -150,7 +154,8 @@ class Odometry:
         A note says so where poses move sideways, which no axle does.
         """
         times, x, y, yaw = _alike(source, times_s=times_s, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
-        yaw = np.unwrap(yaw)
+        anew = _begins_anew(times, np.stack([x, y, yaw], axis=1), gap_max_s, source)
+        notes, yaw = (*texts_from(notes, "notes"), *anew), np.unwrap(yaw)
         turns = np.diff(yaw)
         middle = yaw[:-1] + 0.5 * turns
         chord = np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle)
@@ -161,7 +166,7 @@ class Odometry:
         if apart > max(_ASIDE_M, _ASIDE_SHARE * way):
             told = f"{source}: poses move sideways by {apart:.2f} m beside {way:.2f} m ahead, which is left out"
             asked = "are they of the middle of the axle, and of a robot of two wheels?"
-            notes = (*texts_from(notes, "notes"), f"{told}: {asked}")
+            notes = (*notes, f"{told}: {asked}")
         return cls(times, driven, yaw - yaw[:1], None, source, notes, gap_max_s)
 
     def at(self, times_s: ArrayLike) -> Travelled:
@@ -264,6 +269,21 @@ class Odometry:
             f"{self.times_s[first]:.3f} s by {speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: "
             "was it set anew, or is it in other units?"
         )
+
+
+def _begins_anew(
+    times_s: NDArray[np.float64], values: NDArray[np.float64], gap_max_s: float, source: str
+) -> tuple[str, ...]:
+    """A sentence where poses or counters (N, D) are what they were at first, or 0, behind a gap, in which no step is
+    too long for a robot: their driver was started again. `Odometry.jumps` tells of those without a gap."""
+    if times_s.shape != values.shape[:1]:
+        return ()
+    fresh = np.minimum(np.abs(values), np.abs(values - values[:1])).max(axis=1, initial=0.0) < _FRESH
+    places = 1 + np.flatnonzero((np.diff(times_s) > _gap_from(gap_max_s)) & fresh[1:] & ~fresh[:-1])
+    if not len(places):
+        return ()
+    told = f"{source}: begins anew behind {counted(len(places), 'gaps')}, the first at {times_s[places[0]]:.3f} s"
+    return (f"{told}: what the robot did from before it until then is not known, and taken for a way back to there",)
 
 
 def _jumps(speeds: NDArray[np.float64], steps_s: NDArray[np.float64]) -> NDArray[np.bool_]:
