@@ -183,7 +183,12 @@ def test_converting_a_robot_tells_what_is_left_out(run: Run, tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     ("size", "told"),
-    [((320, 240), "camera scale FILE OUT --to 320x240"), ((480, 640), "by a quarter"), ((600, 480), "camera crop")],
+    [
+        ((320, 240), "camera scale FILE OUT --to 320x240"),
+        ((480, 640), "by a quarter"),
+        ((600, 480), "camera crop"),
+        ((650, 480), "they show more than the calibration does, expected that of the whole image"),
+    ],
 )
 def test_images_of_another_size_are_told_what_fits(run: Run, tmp_path: Path, size: tuple[int, int], told: str) -> None:
     camera, image = tmp_path / "camera.toml", tmp_path / "a.png"

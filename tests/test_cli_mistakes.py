@@ -69,8 +69,8 @@ def folder(camera: tiltvp.Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ("track x.png --camera camera.toml --out t.csv --video v.mp4 --frame-rate 1e9",
          'Invalid value "1000000000.0" for --frame-rate. Must be <= 1000. Try `tiltvp track --help`.'),
         ("track - --raw 640x481 --camera camera.toml --out t.csv",
-         "--raw 640x481: got 481 x 640 pixels, expected 256 x 256 (rows x columns), as the camera's images: if they "
-         "are a part, `tiltvp camera crop FILE OUT --at U V --size 640x481` makes one that fits"),
+         "--raw 640x481: got 481 x 640 pixels, expected 256 x 256 (rows x columns), as the camera's images: they "
+         "show more than the calibration does, expected that of the whole image"),
         ("tilt x.png --camera camera.toml --local-optimization=word",
          'Invalid value "word" for --local-optimization. Must be true or false. Try `tiltvp tilt --help`.'),
         ("tilt x.png --camera camera.toml --seed 1.5",

@@ -53,10 +53,10 @@ def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         if not stat.S_ISREG(state.st_mode):
             raise OSError(errno.EINVAL, "is no regular file")
-        content = stream.read(min(state.st_size, most) + 1)
+        content = b"" if state.st_size > most else stream.read(state.st_size + 1)
         if len(content) > state.st_size:
             # It grows, or does not tell its size, as in /proc.
-            content += stream.read(max(0, most + 1 - len(content)))
+            content += stream.read(most + 1 - len(content))
     size = max(state.st_size, len(content))
     if size > most:
         raise OSError(errno.EFBIG, f"larger than {most} bytes: {size}")

@@ -149,6 +149,8 @@ def _remedy(problem: str) -> str:
         return f": if they were resized, `tiltvp camera scale FILE OUT --to {columns}x{rows}` makes one that fits"
     if (rows, columns) == (width, height):
         return ": rows and columns are swapped, turn the images by a quarter"
+    if rows > height or columns > width:
+        return ": they show more than the calibration does, expected that of the whole image"
     return f": if they are a part, `tiltvp camera crop FILE OUT --at U V --size {columns}x{rows}` makes one that fits"
 
 

@@ -22,6 +22,8 @@ __all__ = ["BAG_ENDINGS", "Message", "Recording", "Topic", "is_recording"]
 
 BAG_ENDINGS: Final = (".bag", ".mcap", ".db3")
 _METADATA: Final = "metadata.yaml"
+_MAGIC: Final = b"#ROSBAG V2.0\n"
+"""The first line of a ROS 1 bag, which rosbags looks for in all of a file that has no lines."""
 MOST_METADATA_BYTES: Final = 16 << 20
 """Of a ROS 2 bag's metadata: some 300 bytes a topic and file, so that 10,000 topics of 1,000 files take 4 MB."""
 
@@ -182,6 +184,12 @@ class Recording:
             elif not self.path.is_file():
                 what = "is no regular file" if self.path.exists() else "no such file"
                 raise InvalidInputError(f"{self.path}: {what}, expected a bag")
+            elif self.path.suffix.lower() == ".bag":
+                with open(self.path, "rb") as stream:
+                    if stream.read(len(_MAGIC)) != _MAGIC:
+                        raise InvalidInputError(
+                            f"{self.path}: not a bag that can be read, expected {_MAGIC!r} in front"
+                        )
         except InvalidInputError:
             raise
         except (OSError, ValueError) as error:
