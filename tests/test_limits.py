@@ -312,3 +312,17 @@ def test_what_is_no_path_is_refused(path: Any) -> None:
     ):  # fmt: skip
         with pytest.raises(TiltvpError, match="expected a"):
             door(path)
+
+
+@pytest.mark.parametrize("name", ["a.bag", "a.png"])
+def test_files_of_gigabytes_are_refused_by_what_they_begin_with(name: str, tmp_path: Path) -> None:
+    """All of them was read, the bag in a minute and into 4 GB."""
+    with open(tmp_path / name, "wb") as file:
+        file.truncate(2**31)
+    tracemalloc.start()
+    try:
+        with pytest.raises(TiltvpError, match=f"{name}: (not a bag that can be read|larger than)"):
+            next(iter(open_frames(tmp_path / name))).read()
+        assert tracemalloc.get_traced_memory()[1] < 2**26
+    finally:
+        tracemalloc.stop()

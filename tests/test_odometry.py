@@ -173,28 +173,6 @@ def test_motions_without_wheels_are_read_by_those_that_they_have(tmp_path: Path)
         read_odometry(path, read_as=["wheels-swapped"])
 
 
-def test_nothing_is_made_up_outside_and_in_gaps() -> None:
-    times = np.array([0.0, 0.1, 0.2, 2.2, 2.3])
-    odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
-    there = odometry.at([-0.1, 0.0, 0.15, 0.2, 1.0, 2.2, 2.3, 2.4])
-    assert there.outside.tolist() == [True, *[False] * 6, True]
-    assert there.in_gap.tolist() == [False] * 4 + [True] + [False] * 3
-    assert np.isnan(there.distance_m).tolist() == (~there.known).tolist()
-    assert odometry.between(0.15, 2.25).distance_m == pytest.approx(2.1), "wheels have counted through the gap"
-    assert odometry.between(0.15, 1.0) is None
-    for start in (-5.0, 1.0, math.nan):
-        assert odometry.between(start, 2.25) is None, "nobody knows where it was"
-    motions = odometry.motions([-0.1, 0.0, 1.0, 2.3])
-    assert [motion and motion.distance_m for motion in motions] == [None, 0.0, None, 2.3]
-    assert odometry.missing([-0.1, 0.0, 1.0, 2.4], ["a", "b", "c", "d"]) == (
-        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) "
-        "and 1 frame in gaps of over 0.5 s by --odometry-gap (c)"
-    )
-    assert odometry.missing([0.0, 0.2], ["a", "b"]) is None
-    with pytest.raises(InvalidInputError, match=r"no velocities from 0\.200 to 2\.200 s"):
-        Odometry.from_velocities(times, times, times)
-
-
 def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
     """Also where no frame is in a gap, and of counters that a robot's driver has set anew."""
     for k in range(3):
@@ -306,22 +284,6 @@ def test_images_of_a_folder_come_in_the_order_of_their_times(tmp_path: Path) -> 
     assert [frame.read()[0, 0] for frame in frames] == list(range(11, 0, -1))
     assert [Path(name).stem for name in frames.names or ()] == [str(k) for k in range(11, 0, -1)]
     assert "in the order of their times" in frames.notes[0]
-
-
-@pytest.mark.parametrize("kind", ["poses", "wheels"])
-def test_a_driver_that_was_started_again_behind_a_gap_is_told(kind: str) -> None:
-    """Its poses and counters are 0 again, and no step of a gap is too long for a robot."""
-    times = np.concatenate([0.1 * np.arange(30), 4.0 + 0.1 * np.arange(30)])
-
-    def made(way: np.ndarray) -> Odometry:
-        if kind == "poses":
-            return Odometry.from_poses(times, 0.3 + way, 0.0 * way, 0.0 * way)
-        return Odometry.from_wheels(times, np.stack([way, way], axis=1))
-
-    assert made(0.2 * times).notes == ()
-    assert made(0.0 * times).notes == (), "a robot that stands"
-    (told,) = made(np.where(times < 4.0, 0.2 * times, 0.2 * (times - 4.0))).notes
-    assert "begins anew behind 1 gap, the first at 4.000 s" in told
 
 
 @pytest.mark.parametrize("ahead_m", [0.0, 0.1])
