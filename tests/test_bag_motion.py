@@ -31,6 +31,24 @@ def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Pa
     assert found == pytest.approx(headings, abs=1e-9)
 
 
+@pytest.mark.parametrize("about", ["z", "y"])
+def test_poses_in_the_axes_of_a_camera_are_refused(about: str, tmp_path: Path) -> None:
+    """As of visual odometry, whose world is its first camera: y is down there, and headings jump by half a turn."""
+    made = Bag("mcap")
+    for k in range(40):
+        made.odometry(START_S + 0.1 * k, 0.0, 0.0, 0.1 * k)
+        turn = made.rows[-1][3].pose.pose.orientation
+        turn.y, turn.z = (turn.z, 0.0) if about == "y" else (0.0, turn.z)
+    bag = made.write(tmp_path)
+    if about == "z":
+        assert read_odometry(bag).yaw_rad[-1] == pytest.approx(3.9)
+        return
+    with pytest.raises(
+        InvalidInputError, match=r"lean by 1[78]\d degrees more .*expected those of a level frame, z up"
+    ):
+        read_odometry(bag)
+
+
 def test_odometry_of_velocities_alone_is_no_robot_that_stands(tmp_path: Path) -> None:
     for speed_mps in (0.5, 0.01):
         made = Bag("mcap")

@@ -29,6 +29,8 @@ _SIDES: Final = (r"(^|[_/.\-])(l|left)([_/.\-]|$)|left", r"(^|[_/.\-])(r|right)(
 """What the names of joints of the left and of the right wheel have in them."""
 _MOVES: Final = 0.05
 """Metres or radians a second that are more than what robots that stand tremble by: for what sends velocities alone."""
+_TUMBLES_RAD: Final = math.radians(60.0)
+"""No ramp that a robot drives is as steep. In a camera's axes, y down, as of visual odometry, a turn is such a lean."""
 _UNIT_SLACK: Final = 1e-2
 """Of a quaternion's length: by what those of few digits are off. One that nobody has filled in has length 0."""
 
@@ -44,11 +46,18 @@ def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odo
         return _from_joints(recording, chosen, wheels)
     more: dict[str, Any] = {"source": f"{recording.path} {chosen.name}", "gap_max_s": wheels.gap_max_s}
     where = f"{recording.path}: {chosen.name}, message"
-    rows, fastest = [], 0.0
+    rows, fastest, leans = [], 0.0, list[float]()
     for k, (time_s, content) in enumerate(recording.decoded(chosen)):
         rows.append((time_s, *_values(content, chosen.kind, f"{where} {k}")))
+        if chosen.kind == _POSES:
+            leans.append(_lean_rad(content))
         fastest = max(fastest, *map(abs, _velocity(content)))
     if chosen.kind == _POSES:
+        if (by := float(np.ptp(leans or [0.0]))) > _TUMBLES_RAD:
+            raise InvalidInputError(
+                f"{more['source']}: poses that lean by {math.degrees(by):.0f} degrees more at one time than at "
+                "another, expected those of a level frame, z up"
+            )
         _refuse_standing(
             {row[1:] for row in rows}, fastest, more["source"], "poses", "a topic of poses, or one of Twist"
         )
@@ -80,6 +89,12 @@ def _values(content: Any, kind: str, where: str) -> tuple[float, ...]:
             )
         return place.x, place.y, math.atan2(2.0 * (q.w * q.z + q.x * q.y), q.w**2 + q.x**2 - q.y**2 - q.z**2)
     return _velocity(content)
+
+
+def _lean_rad(content: Any) -> float:
+    """How far the z axis of a pose is off its frame's."""
+    q = content.pose.pose.orientation
+    return math.atan2(2.0 * math.hypot(q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x), q.w**2 - q.x**2 - q.y**2 + q.z**2)
 
 
 def _velocity(content: Any) -> tuple[float, float]:
