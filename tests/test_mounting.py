@@ -77,6 +77,17 @@ def test_without_turns_it_is_not_told(template):
     assert found.within(math.radians(0.5)) is None
 
 
+def test_a_drive_whose_parts_contradict_each_other_tells_nothing(template):
+    """Answers with deviations of more than was known before were taken for found, and off by four degrees."""
+    estimates, motions = drive(template, direction(1.2, -0.7), direction(0.0, 3.0), TURNS)
+    for turned in (lambda yaw: -yaw, math.degrees):
+        found = mounting_tilt(estimates, [Motion(turned(one.yaw_rad), 0.5) for one in motions], np.eye(3))
+        assert not found
+        assert "parts of the drive contradict each other" in found.reason
+        np.testing.assert_array_equal(found.robot_from_camera, np.eye(3))
+        assert found.within(math.radians(30.0)) is None
+
+
 def test_a_floor_that_is_said_to_be_level_needs_no_turn(template):
     lean = direction(1.2, 0.3)
     estimates, motions = drive(template, lean, direction(0.0, 0.0), np.zeros(60))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -24,6 +24,9 @@ __all__ = ["MountingTilt", "mounting_tilt"]
 
 _PRIOR_RAD: Final = math.radians(5.0)
 """How far a mounting may be off before it is known: as far as a camera that is screwed on by eye."""
+_KNOWN_RAD: Final = 0.5 * _PRIOR_RAD
+"""Least deviation of what a drive does not tell: half of what was known before it. Parts of such a drive contradict
+each other, as with odometry of another clock; rendered drives whose odometry is right state less than 0.3 degrees."""
 _LEVEL: Final[dict[str, Any]] = {
     "prior_rad": math.radians(0.05), "walk_rad_per_sqrt_m": 0.0, "walk_rad_per_sqrt_step": 0.0,
 }  # fmt: skip
@@ -55,7 +58,8 @@ class MountingTilt:
     """
 
     robot_from_camera: NDArray[np.float64]
-    """(3, 3): the mounting that was given, turned the least so that the robot stands upright on a level floor."""
+    """(3, 3): the mounting that was given, where the drive tells it turned the least so that the robot stands upright
+    on a level floor."""
     lean: FilteredTilt
     """By how much the robot seems to lean on a level floor by the mounting that was given, with its covariance."""
     floor: FilteredTilt
@@ -78,7 +82,7 @@ class MountingTilt:
     """(2, 2): what no turn averages out: a part of what images scatter by, without turns all that one may err by."""
 
     def __bool__(self) -> bool:
-        return bool(self.lean)
+        return bool(self.lean) and self.sigma_rad < _KNOWN_RAD
 
     @property
     def sigma_rad(self) -> float:
@@ -95,6 +99,10 @@ class MountingTilt:
                 return f"{told}: the odometry tells of the time of none"
             if not self.used:
                 return f"{told}: no image tells a tilt"
+            if self.lean:
+                sigma = math.degrees(self.sigma_rad)
+                need = "expected odometry of the images' clock, in the right sense and units"
+                return f"{told}: parts of the drive contradict each other, 1-sigma {sigma:.3f} degrees, {need}"
             need = "expected a robot that turns in place, or a floor that is said to be level"
             return f"{told}: the floor's tilt and the mounting's are not told apart, {need}"
         off, sigma = math.degrees(self.lean.alpha_rad), math.degrees(self.sigma_rad)
@@ -145,7 +153,6 @@ def mounting_tilt(
     lean, used = whole.lean, len(whole.covariances)
     headings = np.cumsum([0.0, *(motion.yaw_rad for motion in driven[1:])])
     turned = min(float(np.ptp(headings)), math.tau)
-    upright = levelling(lean.normal) @ rotation if lean else rotation
     shared, covariance = np.zeros((2, 2)), np.asarray(lean.covariance_rad2)
     if lean:
         # Of a filter that is right the mean normalised innovation squared is 2.
@@ -158,10 +165,11 @@ def mounting_tilt(
         scatter = _scatter(given, driven, lean, told) if used >= 2 * _PARTS else None
         stated = (1.0 if scatter is None else alike) * max(1.0, excess) * covariance
         covariance = shared + _beyond(stated, shared) + (0.0 if scatter is None else scatter)
-    return MountingTilt(
-        upright, lean, whole.floor, len(images), len(known), used, turned, level_floor, _about_axes(covariance),
+    found = MountingTilt(
+        rotation, lean, whole.floor, len(images), len(known), used, turned, level_floor, _about_axes(covariance),
         _about_axes(shared),
     )  # fmt: skip
+    return replace(found, robot_from_camera=levelling(lean.normal) @ rotation) if found else found
 
 
 @dataclass(frozen=True, eq=False)

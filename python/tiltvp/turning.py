@@ -97,7 +97,8 @@ class TurnCheck:
             return f"{found}: the image is mirrored, or left and right of the odometry are swapped"
         if self:
             return f"{found}: images turn as told"
-        return f"{found}, over {math.degrees(self.turned_rad):.0f} degrees: not told, expected turns by 45 degrees"
+        need = "turns by 45 degrees" if self.turned_rad < _TURNED_RAD else "more views that are 6 to 50 degrees apart"
+        return f"{found}, over {math.degrees(self.turned_rad):.0f} degrees: not told, expected {need}"
 
 
 def check_turns(
