@@ -338,9 +338,18 @@ def test_a_log_that_is_named_twice_is_no_second_one(tables: Path, capsys: pytest
 
 
 def test_pictures_that_there_are_not_are_told_to_be_none(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ("calibrate", "no-such-drive", "--camera", tables / "robot.toml")
-    assert main([str(word) for word in words]) == 2
+    assert main(["calibrate", "no-such-drive", "--camera", str(tables / "robot.toml")]) == 2
     assert "no-such-drive: no such file or folder, expected" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".tsv", ".parquet", ".txt", ".JSON"])
+def test_tables_of_other_endings_are_not_taken_for_pictures(
+    ending: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / f"wheels{ending}"
+    other.touch()
+    assert main([str(word) for word in ("calibrate", other, "bearings.csv", "--wheel-base", 0.4)]) == 2
+    assert f"{other}: a file that ends in {ending.lower()}, expected ODOMETRY.csv" in capsys.readouterr().err
 
 
 def test_a_camera_that_cannot_be_read_is_no_lack_of_a_wheel_base(

@@ -38,6 +38,8 @@ _REMEDIES = {
 """What may mend a log that was misread, where it has another name."""
 _FORMS: Final = "ODOMETRY.csv BEARINGS.csv, or the pictures of a drive with --camera FILE"
 _TABLE: Final = ".csv"
+_OTHER_TABLES: Final = (".json", ".parquet", ".tsv", ".txt", ".xlsx")
+"""Files that hold tables elsewhere, and never pictures: they are not to be asked for a camera."""
 _WIDEST_M: Final = 10.0
 """Wheels that are farther apart are those of a crane: the widest haul trucks are 9.9 m wide in all."""
 
@@ -190,7 +192,9 @@ def sources_from(words: Sequence[str]) -> list[Tables | str]:
         word = rest.pop(0)
         if Path(word).suffix.lower() in IMAGE_ENDINGS and Path(word).is_file():
             raise InvalidInputError(f"{word}: one image, expected the folder of a drive's, or a pattern in quotes")
-        if Path(word).suffix.lower() != _TABLE:
+        if (ending := Path(word).suffix.lower()) in _OTHER_TABLES and Path(word).is_file():
+            raise InvalidInputError(f"{word}: a file that ends in {ending}, expected {_FORMS}")
+        if ending != _TABLE:
             if not (Path(word).exists() or glob.has_magic(word)):
                 raise InvalidInputError(f"{word}: no such file or folder, expected {_FORMS}")
             found.append(word)
