@@ -1,5 +1,6 @@
 //! What is most likely wrong with a log is named.
 
+use nalgebra::Vector2;
 use tiltvp_core::filter::ConsistencyBand;
 use tiltvp_core::selfcalib::{CalibrationMethod, Cause, LogCalibration, LogOptions, Misreading, MountingEstimate};
 
@@ -7,11 +8,27 @@ use crate::simulated::{
     DRIVES, Drive, Errors, NONE, Turns, assert_relied_upon, band, drive, followed, mean, nees, options, whole,
 };
 
+/// What is found beside the mounting, with its standard deviations, and the mounting: the one alone and three numbers together.
+fn assert_errors_are_as_stated(
+    what: &str,
+    found: &[LogCalibration],
+    of: impl Fn(&LogCalibration) -> (Vector2<f64>, Vector2<f64>),
+    truth: [f64; 2],
+) {
+    let alone = ConsistencyBand::of_mean(0.9999, 1, DRIVES).unwrap();
+    let squares = [0, 1].map(|k| {
+        let square = |(value, sigma): (Vector2<f64>, Vector2<f64>)| ((value[k] - truth[k]) / sigma[k]).powi(2);
+        mean(found.iter().map(|found| square(of(found))))
+    });
+    let nees = mean(found.iter().map(|found| nees(&found.estimate)));
+    println!("{what}: mean squared errors in stated sigmas {squares:.2?}, NEES of the mounting {nees:.2} of 3");
+    assert!(squares.iter().all(|square| alone.holds(*square)) && band().holds(nees), "{squares:?}, {nees}");
+}
+
 /// From bearings about a centre that is off by one to eight pixels where posts are seen at a radius of 150.
 #[test]
 fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
     let options = LogOptions { estimate_centre: true, ..options() };
-    let alone = ConsistencyBand::of_mean(0.9999, 1, DRIVES).unwrap();
     for centre in [[0.0067, 0.0], [-0.012, 0.016], [0.0, -0.053]] {
         let drives: Vec<Drive> = (0..DRIVES).map(|seed| drive(seed, Errors { centre, ..NONE })).collect();
         for drive in &drives {
@@ -23,15 +40,8 @@ fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
             assert!(!followed.reliable(), "{followed}");
         }
         let found: Vec<LogCalibration> = drives.iter().map(|drive| whole(drive, &options)).collect();
-        let square = |found: &LogCalibration, k: usize| {
-            ((found.centre_off_rad[k] - centre[k]) / found.centre_off_sigma_rad[k]).powi(2)
-        };
-        let squares = [0, 1].map(|k| mean(found.iter().map(|found| square(found, k))));
-        let nees = mean(found.iter().map(|found| nees(&found.estimate)));
-        println!(
-            "a centre off by {centre:?}: mean squared errors in stated sigmas {squares:.2?}, NEES of the mounting {nees:.2} of 3"
-        );
-        assert!(squares.iter().all(|square| alone.holds(*square)) && band().holds(nees), "{squares:?}, {nees}");
+        let of = |found: &LogCalibration| (found.centre_off_rad, found.centre_off_sigma_rad);
+        assert_errors_are_as_stated(&format!("a centre off by {centre:?}"), &found, of, centre);
         assert_relied_upon(&found);
     }
 }
@@ -40,7 +50,6 @@ fn an_image_centre_that_is_off_is_named_and_found_with_the_mounting() {
 #[test]
 fn a_rolling_shutter_is_named_and_found_with_the_mounting() {
     let options = LogOptions { estimate_rolling_shutter: true, ..options() };
-    let alone = ConsistencyBand::of_mean(0.9999, 1, DRIVES).unwrap();
     for (turns, shutter_s) in [
         (Turns::Winding, [0.0, 0.0]),
         (Turns::Winding, [0.009, -0.012]),
@@ -54,15 +63,8 @@ fn a_rolling_shutter_is_named_and_found_with_the_mounting() {
         let named = drives.iter().filter(is_named).count();
         assert!(if shutter_s == [0.0; 2] { named <= 1 } else { named >= 19 }, "{named}");
         let found: Vec<LogCalibration> = drives.iter().map(|drive| whole(drive, &options)).collect();
-        let square = |found: &LogCalibration, k: usize| {
-            ((found.rolling_shutter_s[k] - shutter_s[k]) / found.rolling_shutter_sigma_s[k]).powi(2)
-        };
-        let squares = [0, 1].map(|k| mean(found.iter().map(|found| square(found, k))));
-        let nees = mean(found.iter().map(|found| nees(&found.estimate)));
-        println!(
-            "a rolling shutter of {shutter_s:?} s, {turns:?}: mean squared errors in stated sigmas {squares:.2?}, NEES of the mounting {nees:.2} of 3"
-        );
-        assert!(squares.iter().all(|square| alone.holds(*square)) && band().holds(nees), "{squares:?}, {nees}");
+        let of = |found: &LogCalibration| (found.rolling_shutter_s, found.rolling_shutter_sigma_s);
+        assert_errors_are_as_stated(&format!("a rolling shutter of {shutter_s:?} s, {turns:?}"), &found, of, shutter_s);
         assert_relied_upon(&found);
     }
 }
