@@ -357,7 +357,9 @@ def test_the_command_tells_a_rolling_shutter_that_it_is_asked_for(
     assert main(words) == 1
     assert "try estimate_rolling_shutter, or drive more slowly" in capsys.readouterr().out
     assert main([*words, "--estimate-rolling-shutter"]) == 0
-    assert "rolling shutter: lines forward in the camera are seen" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "rolling shutter: lines forward in the camera are seen" in told
+    assert "steps (seconds, with times)" in told
 
 
 def test_the_table_counts_as_it_says() -> None:

@@ -275,7 +275,8 @@ def _show(one: Calibration, *, several: bool) -> None:
     if whole.rolling_shutter_sigma_s[0] > 0.0:
         both = np.transpose([whole.rolling_shutter_s, whole.rolling_shutter_sigma_s])
         forward, left = (f"{late:.4f} +- {sigma:.4f}" for late, sigma in both)
-        say(f"rolling shutter: lines forward in the camera are seen {forward} s late, those to its left {left} s")
+        told = f"lines forward in the camera are seen {forward} late, those to its left {left}"
+        say(f"rolling shutter: {told}: steps (seconds, with times)")
     if one.late_s and one.frames_late_s is not None:
         say(f"frames are stamped {one.frames_late_s:.4f} +- {whole.time_offset_sigma_s:.4f} s late in all")
 
